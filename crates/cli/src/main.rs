@@ -1,0 +1,3 @@
+//! The binary `prehend`.
+
+fn main() {}

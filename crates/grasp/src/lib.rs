@@ -1,0 +1,1 @@
+//! Which grasps has this hand on this object, and what are their features?

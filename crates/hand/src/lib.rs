@@ -1,0 +1,1 @@
+//! Where is every link of a hand in this posture?

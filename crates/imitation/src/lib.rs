@@ -1,0 +1,1 @@
+//! Which object and grasp best match a demonstration?

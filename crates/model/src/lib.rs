@@ -1,0 +1,1 @@
+//! What follows from evidence in a mixed Bayesian network?

@@ -1,0 +1,1 @@
+//! How do the stages become the experiments? The library of stages.

@@ -1,0 +1,1 @@
+//! How do results become figures and one page?

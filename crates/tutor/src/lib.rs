@@ -1,0 +1,1 @@
+//! Which tasks would a person say that this grasp affords?
