@@ -1,0 +1,149 @@
+//! The solids of a link, from its `<collision>` and `<visual>` elements.
+
+use nalgebra::{Isometry3, Vector3};
+use prehend_geometry::{PlacedSolid, Solid};
+use urdf_rs::Geometry;
+
+use crate::urdf::pose;
+use crate::{HandError, Link};
+
+/// Takes a mesh file's name, as the URDF gives it, to its bytes, or says why it cannot.
+pub type Resolve<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
+
+pub(crate) struct ShapeReader<'a> {
+    resolve: &'a Resolve<'a>,
+    warnings: Vec<String>,
+}
+
+impl<'a> ShapeReader<'a> {
+    pub fn new(resolve: &'a Resolve<'a>) -> Self {
+        Self {
+            resolve,
+            warnings: Vec::new(),
+        }
+    }
+
+    pub fn into_warnings(self) -> Vec<String> {
+        self.warnings
+    }
+
+    pub fn read_link(&mut self, raw: &urdf_rs::Link) -> Result<Link, HandError> {
+        let place = || format!("link `{}`", raw.name);
+        let mut collision = Vec::with_capacity(raw.collision.len());
+        for element in &raw.collision {
+            let link_from_solid = pose(&element.origin, place)?;
+            collision.push(self.read_solid(&raw.name, &element.geometry, link_from_solid)?);
+        }
+        let mut visual = Vec::with_capacity(raw.visual.len());
+        for element in &raw.visual {
+            let link_from_solid = pose(&element.origin, place)?;
+            match self.read_solid(&raw.name, &element.geometry, link_from_solid) {
+                Ok(solid) => visual.push(solid),
+                Err(error @ (HandError::MeshMissing { .. } | HandError::MeshUnreadable { .. })) => {
+                    self.warnings.push(format!("not drawn: {error}"));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Link {
+            name: raw.name.clone(),
+            collision,
+            visual,
+            mass: mass(raw)?,
+        })
+    }
+
+    fn read_solid(
+        &mut self,
+        link: &str,
+        geometry: &Geometry,
+        link_from_solid: Isometry3<f64>,
+    ) -> Result<PlacedSolid, HandError> {
+        let size = |what, numbers: &[f64]| positive(link, what, numbers);
+        let solid = match geometry {
+            Geometry::Box { size: lengths } => {
+                size("box size", &lengths.0)?;
+                Solid::Cuboid {
+                    half_extents: Vector3::from(lengths.0) / 2.0,
+                }
+            }
+            Geometry::Cylinder { radius, length } => {
+                size("cylinder radius and length", &[*radius, *length])?;
+                Solid::Cylinder {
+                    half_length: length / 2.0,
+                    radius: *radius,
+                }
+            }
+            // As in SDF and MuJoCo, the length is that of the cylinder between the caps.
+            Geometry::Capsule { radius, length } => {
+                size("capsule radius and length", &[*radius, *length])?;
+                Solid::Capsule {
+                    half_length: length / 2.0,
+                    radius: *radius,
+                }
+            }
+            Geometry::Sphere { radius } => {
+                size("sphere radius", &[*radius])?;
+                Solid::Sphere { radius: *radius }
+            }
+            Geometry::Mesh { filename, scale } => {
+                let scale = scale.map_or(Vector3::repeat(1.0), |s| Vector3::from(s.0));
+                self.read_mesh(link, filename, &scale)?
+            }
+        };
+        Ok(PlacedSolid {
+            solid,
+            link_from_solid,
+        })
+    }
+
+    fn read_mesh(&mut self, link: &str, file: &str, scale: &Vector3<f64>) -> Result<Solid, HandError> {
+        if scale.iter().any(|s| !s.is_finite() || *s == 0.0) {
+            return Err(HandError::Value {
+                place: format!("link `{link}`, mesh `{file}`"),
+                what: "scale",
+                found: format!("{:?}", scale.as_slice()),
+                expected: "three finite numbers, none of them 0",
+            });
+        }
+        let _bytes = (self.resolve)(file).map_err(|reason| HandError::MeshMissing {
+            link: link.to_owned(),
+            file: file.to_owned(),
+            reason,
+        })?;
+        Err(HandError::MeshUnreadable {
+            link: link.to_owned(),
+            file: file.to_owned(),
+            reason: "mesh files are not read yet; use boxes, capsules, cylinders and spheres".into(),
+        })
+    }
+}
+
+fn positive(link: &str, what: &'static str, numbers: &[f64]) -> Result<(), HandError> {
+    if numbers.iter().all(|n| n.is_finite() && *n > 0.0) {
+        return Ok(());
+    }
+    Err(HandError::Value {
+        place: format!("link `{link}`"),
+        what,
+        found: format!("{numbers:?}"),
+        expected: "positive, finite lengths in metres",
+    })
+}
+
+/// The mass, kg. A link without `<inertial>` comes out of the XML with mass 0, which stands for none.
+fn mass(raw: &urdf_rs::Link) -> Result<Option<f64>, HandError> {
+    let mass = raw.inertial.mass.value;
+    if mass == 0.0 {
+        return Ok(None);
+    }
+    if mass.is_finite() && mass > 0.0 {
+        return Ok(Some(mass));
+    }
+    Err(HandError::Value {
+        place: format!("link `{}`", raw.name),
+        what: "mass",
+        found: mass.to_string(),
+        expected: "a positive number of kilograms",
+    })
+}
