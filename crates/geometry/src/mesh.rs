@@ -32,7 +32,11 @@ impl TriMesh {
         }
         for (triangle, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices.len()) {
-                return Err(GeometryError::VertexOutOfRange { triangle, vertex, n_vertices: vertices.len() });
+                return Err(GeometryError::VertexOutOfRange {
+                    triangle,
+                    vertex,
+                    n_vertices: vertices.len(),
+                });
             }
         }
         Ok(Self { vertices, triangles })
@@ -53,27 +57,46 @@ impl TriMesh {
         self.triangles.len()
     }
 
-    /// The three corners of one triangle. Panics where `triangle_idx` is out of range.
+    /// The three corners of one triangle.
+    ///
+    /// # Panics
+    ///
+    /// Where `triangle_idx` is out of range.
     pub fn triangle(&self, triangle_idx: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle_idx].map(|v| self.vertices[v as usize])
     }
 
     /// All triangles' corners, in order.
     pub fn corners(&self) -> impl ExactSizeIterator<Item = [Point3<f64>; 3]> + '_ {
-        self.triangles.iter().map(|t| t.map(|v| self.vertices[v as usize]))
+        self.triangles
+            .iter()
+            .map(|t| t.map(|v| self.vertices[v as usize]))
     }
 
     /// The mesh moved by a rigid motion.
     #[must_use]
     pub fn transformed(&self, motion: &Isometry3<f64>) -> Self {
-        Self { vertices: self.vertices.iter().map(|p| motion * p).collect(), triangles: self.triangles.clone() }
+        Self {
+            vertices: self.vertices.iter().map(|p| motion * p).collect(),
+            triangles: self.triangles.clone(),
+        }
     }
 
-    /// The mesh scaled about the origin; `factor` must be positive and finite.
+    /// The mesh scaled about the origin.
+    ///
+    /// # Panics
+    ///
+    /// Where `factor` is not positive and finite.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
-        assert!(factor.is_finite() && factor > 0.0, "a scale must be positive and finite, found {factor}");
-        Self { vertices: self.vertices.iter().map(|p| p * factor).collect(), triangles: self.triangles.clone() }
+        assert!(
+            factor.is_finite() && factor > 0.0,
+            "a scale must be positive and finite, found {factor}"
+        );
+        Self {
+            vertices: self.vertices.iter().map(|p| p * factor).collect(),
+            triangles: self.triangles.clone(),
+        }
     }
 
     /// Lowest and highest coordinates over the vertices that triangles use.

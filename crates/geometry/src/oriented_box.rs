@@ -19,17 +19,32 @@ impl OrientedBox {
     /// # Errors
     ///
     /// [`GeometryError::BadExtents`] unless every extent is positive and finite.
-    pub fn new(center: Point3<f64>, axes: Rotation3<f64>, extents: Vector3<f64>) -> Result<Self, GeometryError> {
+    pub fn new(
+        center: Point3<f64>,
+        axes: Rotation3<f64>,
+        extents: Vector3<f64>,
+    ) -> Result<Self, GeometryError> {
         if extents.iter().all(|e| e.is_finite() && *e > 0.0) {
-            Ok(Self { center, axes, extents })
+            Ok(Self {
+                center,
+                axes,
+                extents,
+            })
         } else {
-            Err(GeometryError::BadExtents { extents: extents.into() })
+            Err(GeometryError::BadExtents {
+                extents: extents.into(),
+            })
         }
     }
 
-    /// An axis-aligned box about the origin. Panics where an extent is not positive and finite.
+    /// An axis-aligned box about the origin.
+    ///
+    /// # Panics
+    ///
+    /// Where an extent is not positive and finite.
     pub fn centered(extents: [f64; 3]) -> Self {
-        Self::new(Point3::origin(), Rotation3::identity(), extents.into()).expect("extents are positive and finite")
+        Self::new(Point3::origin(), Rotation3::identity(), extents.into())
+            .expect("extents are positive and finite")
     }
 
     /// Centre, in the frame that the box is given in.
@@ -70,12 +85,17 @@ impl OrientedBox {
     /// Whether the point lies inside or on the box, grown by `margin` on every side.
     pub fn contains(&self, point: &Point3<f64>, margin: f64) -> bool {
         let half = self.half_extents();
-        self.local(point).iter().zip(half.iter()).all(|(x, h)| x.abs() <= h + margin)
+        self.local(point)
+            .iter()
+            .zip(half.iter())
+            .all(|(x, h)| x.abs() <= h + margin)
     }
 
     /// Distance from a point to the box; 0 inside.
     pub fn distance(&self, point: &Point3<f64>) -> f64 {
-        (self.local(point).abs() - self.half_extents()).sup(&Vector3::zeros()).norm()
+        (self.local(point).abs() - self.half_extents())
+            .sup(&Vector3::zeros())
+            .norm()
     }
 
     /// The eight corners; corner `i` has the sign of bit `k` of `i` along axis `k` (set: positive).
@@ -104,7 +124,12 @@ struct BoxRecord {
 impl Serialize for OrientedBox {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let axes = std::array::from_fn(|k| self.axis(k).into());
-        BoxRecord { center: self.center.coords.into(), axes, extents: self.extents.into() }.serialize(serializer)
+        BoxRecord {
+            center: self.center.coords.into(),
+            axes,
+            extents: self.extents.into(),
+        }
+        .serialize(serializer)
     }
 }
 
@@ -122,7 +147,11 @@ impl<'de> Deserialize<'de> for OrientedBox {
         }
         // Rows written with a few digits are made orthonormal again, so that volumes stay exact.
         let axes = Rotation3::from_matrix_eps(&matrix, 1e-15, 32, Rotation3::from_matrix_unchecked(matrix));
-        let axes = if error < 1e-14 { Rotation3::from_matrix_unchecked(matrix) } else { axes };
+        let axes = if error < 1e-14 {
+            Rotation3::from_matrix_unchecked(matrix)
+        } else {
+            axes
+        };
         Self::new(record.center.into(), axes, record.extents.into()).map_err(D::Error::custom)
     }
 }
