@@ -1,0 +1,129 @@
+//! Why the quality of a grasp could not be computed.
+
+/// Why the quality of a grasp could not be computed. A grasp that merely does not hold is a value, never an error.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum QualityError {
+    /// There is nothing to measure.
+    #[error("the grasp has no contacts; give at least one")]
+    NoContacts,
+
+    /// A contact's point has a coordinate that is NaN or infinite.
+    #[error("contact {contact_idx} has the point {point:?}; every coordinate must be finite")]
+    BadPoint {
+        /// Index of the contact, from 0.
+        contact_idx: usize,
+        /// The offending point.
+        point: [f64; 3],
+    },
+
+    /// A contact's normal has no direction.
+    #[error(
+        "contact {contact_idx} has the normal {normal:?}; expected a vector of finite, non-zero length into the object"
+    )]
+    BadNormal {
+        /// Index of the contact, from 0.
+        contact_idx: usize,
+        /// The offending normal.
+        normal: [f64; 3],
+    },
+
+    /// A contact's friction coefficient is negative or not finite.
+    #[error(
+        "contact {contact_idx} has the friction coefficient mu = {mu}; expected a finite number, 0 or more"
+    )]
+    BadFriction {
+        /// Index of the contact, from 0.
+        contact_idx: usize,
+        /// The offending coefficient.
+        mu: f64,
+    },
+
+    /// A contact's torsion length is negative or not finite.
+    #[error(
+        "contact {contact_idx} has the torsion length {torsion}; expected a finite length, 0 for a point contact"
+    )]
+    BadTorsion {
+        /// Index of the contact, from 0.
+        contact_idx: usize,
+        /// The offending length.
+        torsion: f64,
+    },
+
+    /// The point that torques are taken about is not finite.
+    #[error("the torque center is {center:?}; every coordinate must be finite")]
+    BadCenter {
+        /// The offending point.
+        center: [f64; 3],
+    },
+
+    /// Torques are divided by this length, so it must be positive.
+    #[error(
+        "the torque scale is {torque_scale}; expected a positive, finite length, \
+         such as the largest distance of the object's vertices from its center"
+    )]
+    BadTorqueScale {
+        /// The offending length.
+        torque_scale: f64,
+    },
+
+    /// A friction cone has too few or too many edges.
+    #[error("a friction cone has {cone_edges} edges; expected 3 to {most}")]
+    BadConeEdges {
+        /// How many edges were asked for.
+        cone_edges: usize,
+        /// How many there may be.
+        most: usize,
+    },
+
+    /// A wrench left the range of floating-point numbers.
+    #[error(
+        "contact {contact_idx} makes a wrench that is not finite; check its point, mu and the torque scale"
+    )]
+    WrenchOverflow {
+        /// Index of the contact, from 0.
+        contact_idx: usize,
+    },
+
+    /// The polytope reached its bound on facets first.
+    #[error(
+        "{what} needs more than {facets} facets of the wrench hull; \
+         use fewer contacts or cone edges, or the l1 norm"
+    )]
+    TooManyFacets {
+        /// What was being computed: `epsilon` or `volume`.
+        what: &'static str,
+        /// The bound.
+        facets: usize,
+    },
+
+    /// A name is not one of the materials.
+    #[error("`{found}` is not a material; expected glass, metal, plastic, wood, rubber or stone")]
+    UnknownMaterial {
+        /// The name found.
+        found: String,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_name_the_contact_and_what_was_expected() {
+        let error = QualityError::BadNormal {
+            contact_idx: 3,
+            normal: [0.0, 0.0, 0.0],
+        };
+        assert_eq!(
+            error.to_string(),
+            "contact 3 has the normal [0.0, 0.0, 0.0]; expected a vector of finite, non-zero length into the object"
+        );
+        let error = QualityError::BadTorqueScale { torque_scale: 0.0 };
+        assert_eq!(
+            error.to_string(),
+            "the torque scale is 0; expected a positive, finite length, \
+             such as the largest distance of the object's vertices from its center"
+        );
+    }
+}
