@@ -1,22 +1,34 @@
 //! Where do shapes meet, and how much do they share?
 
+mod between_solids;
+mod closest;
+mod collider;
 mod contact_point;
+mod distance_grid;
 mod enclosure;
 mod error;
+mod gap;
 mod mass_properties;
 mod mesh;
 mod oriented_box;
+mod parry_bridge;
 mod shared_volume;
 mod simplex;
 mod solid;
+mod solid_shape;
+mod surface;
 mod tetrahedron;
+mod triangle_tree;
 
+pub use collider::{Ball, Collider};
 pub use contact_point::ContactPoint;
 pub use enclosure::largest_tetrahedron;
 pub use error::GeometryError;
+pub use gap::Gap;
 pub use mass_properties::{MassProperties, mass_properties, signed_volume, surface_area, surface_centroid};
 pub use mesh::TriMesh;
 pub use oriented_box::OrientedBox;
 pub use shared_volume::union_volume;
 pub use solid::{PlacedSolid, Solid};
+pub use surface::{Hit, Surface, SurfacePoint};
 pub use tetrahedron::Tetrahedron;

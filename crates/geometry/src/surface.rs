@@ -1,0 +1,208 @@
+//! A mesh made ready for distance, contact and inside queries.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+use crate::TriMesh;
+use crate::distance_grid::DistanceGrid;
+use crate::triangle_tree::TriangleTree;
+
+/// The surface of a mesh, made ready for queries: a tree over its triangles and a grid of distances.
+///
+/// Any triangle soup will do; nothing here needs a closed mesh. Cloning is cheap.
+///
+/// ```
+/// use nalgebra::{Isometry3, Point3};
+/// use prehend_geometry::{Collider, Solid, Surface, TriMesh};
+///
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from).to_vec();
+/// let surface = Surface::new(TriMesh::new(corners, vec![[0, 1, 2]])?);
+/// let finger = Collider::new(&Solid::Capsule { half_length: 0.2, radius: 0.1 })?;
+/// let above = Isometry3::translation(0.2, 0.2, 0.5);
+/// let gap = surface.gap(&finger, &above, 1.0).expect("closer than 1 m");
+/// assert!((gap.distance - 0.2).abs() < 1e-12);
+/// # Ok::<(), prehend_geometry::GeometryError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Surface {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    mesh: TriMesh,
+    tree: TriangleTree,
+    grid: DistanceGrid,
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
+/// A point of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// The point, metres.
+    pub point: Point3<f64>,
+    /// The triangle that it lies on.
+    pub triangle: usize,
+    /// Its distance from where the question was asked, metres.
+    pub distance: f64,
+}
+
+/// Where a ray meets a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray, metres.
+    pub distance: f64,
+    /// The triangle that is met.
+    pub triangle: usize,
+}
+
+impl Surface {
+    /// Makes a mesh ready. Takes some tens of nanoseconds a triangle and about 0.1 s for the grid.
+    pub fn new(mesh: TriMesh) -> Self {
+        let tree = TriangleTree::new(&mesh);
+        let (low, high) = mesh.axis_aligned_bounds();
+        let grid = DistanceGrid::new(&tree, low, high);
+        Self {
+            shared: Arc::new(Shared {
+                mesh,
+                tree,
+                grid,
+                low,
+                high,
+            }),
+        }
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.shared.mesh
+    }
+
+    /// Lowest and highest coordinates.
+    pub fn axis_aligned_bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        (self.shared.low, self.shared.high)
+    }
+
+    /// The point of the surface that is closest to `p`.
+    pub fn closest_point(&self, p: &Point3<f64>) -> SurfacePoint {
+        let (distance, point, triangle) = self
+            .tree()
+            .nearest_point(p, f64::INFINITY)
+            .expect("a mesh has a triangle, and its coordinates are finite");
+        SurfacePoint {
+            point,
+            triangle: triangle as usize,
+            distance,
+        }
+    }
+
+    /// The first triangle that a ray meets within `max`, from either side; `direction` need not be unit (zero: none).
+    pub fn cast_ray(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
+        let direction = direction.try_normalize(0.0)?;
+        let (distance, triangle) = self.tree().cast_ray(origin, &direction, max)?;
+        Some(Hit {
+            distance,
+            triangle: triangle as usize,
+        })
+    }
+
+    /// How often the surface winds around `p`: 1 inside a closed mesh, 0 outside, in between near holes.
+    ///
+    /// The solid angles of all triangles over 4π (Jacobson, Kavan and Sorkine-Hornung, *Robust inside-outside
+    /// segmentation using generalized winding numbers*, 2013). Costs a pass over all triangles.
+    pub fn winding_number(&self, p: &Point3<f64>) -> f64 {
+        let mut half_angles = 0.0;
+        for [a, b, c] in self.mesh().corners().map(|t| t.map(|q| q - p)) {
+            let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+            let y = a.dot(&b.cross(&c));
+            let x = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+            half_angles += y.atan2(x);
+        }
+        half_angles / std::f64::consts::TAU
+    }
+
+    /// Whether `p` lies inside: its winding number is above one half (below −½ for a mesh turned inside out).
+    pub fn is_inside(&self, p: &Point3<f64>) -> bool {
+        let within = (0..3).all(|k| p[k] >= self.shared.low[k] && p[k] <= self.shared.high[k]);
+        within && self.winding_number(p).abs() > 0.5
+    }
+
+    /// A lower bound of the distance from `p` to the surface, from the grid; some tens of nanoseconds.
+    pub fn distance_lower_bound(&self, p: &Point3<f64>) -> f64 {
+        self.shared.grid.lower_bound(p)
+    }
+
+    /// The unit normal of a triangle, outward where the mesh is wound outward; `None` for one without area.
+    pub fn face_normal(&self, triangle: usize) -> Option<UnitVector3<f64>> {
+        let [a, b, c] = self.mesh().triangle(triangle);
+        let n = (b - a).cross(&(c - a));
+        UnitVector3::try_new(n, f64::MIN_POSITIVE)
+    }
+
+    pub(crate) fn tree(&self) -> &TriangleTree {
+        &self.shared.tree
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The unit cube about the origin; `n_triangles` of its twelve.
+    fn cube(n_triangles: usize) -> Surface {
+        let solid = crate::Solid::Cuboid {
+            half_extents: Vector3::repeat(0.5),
+        };
+        let mesh = solid.display_mesh();
+        Surface::new(
+            TriMesh::new(mesh.vertices().to_vec(), mesh.triangles()[..n_triangles].to_vec()).unwrap(),
+        )
+    }
+
+    #[test]
+    fn the_centre_of_a_cube_is_inside_also_when_a_triangle_is_missing() {
+        for n in [12, 11] {
+            assert!(cube(n).is_inside(&Point3::origin()));
+            assert!(!cube(n).is_inside(&Point3::new(0.0, 0.0, 0.7)));
+        }
+        assert!((cube(12).winding_number(&Point3::new(0.1, -0.3, 0.2)) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_ray_from_the_centre_of_a_cube_leaves_through_its_faces() {
+        let cube = cube(12);
+        let hit = cube
+            .cast_ray(&Point3::new(0.1, 0.2, 0.0), &Vector3::new(0.0, 0.0, 3.0), 1.0)
+            .unwrap();
+        assert!((hit.distance - 0.5).abs() < 1e-12);
+        assert!(cube.face_normal(hit.triangle).unwrap().z > 0.99);
+        assert!(cube.cast_ray(&Point3::origin(), &Vector3::z(), 0.4).is_none());
+        assert!(cube.cast_ray(&Point3::origin(), &Vector3::zeros(), 4.0).is_none());
+    }
+
+    #[test]
+    fn the_closest_point_agrees_with_a_search_over_all_triangles() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut random = || rng.random_range(-1.0..1.0);
+        let vertices: Vec<_> = (0..60)
+            .map(|_| Point3::new(random(), random(), random()))
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..58).map(|i| [i, i + 1, i + 2]).collect();
+        let surface = Surface::new(TriMesh::new(vertices, triangles).unwrap());
+        for _ in 0..500 {
+            let p = Point3::new(random(), random(), random()) * 2.0;
+            let all = surface
+                .mesh()
+                .corners()
+                .map(|t| (crate::closest::on_triangle(&p, &t) - p).norm());
+            let least = all.fold(f64::INFINITY, f64::min);
+            let found = surface.closest_point(&p);
+            assert!((found.distance - least).abs() < 1e-12);
+            assert!((found.point - p).norm() - least < 1e-12);
+        }
+    }
+}
