@@ -48,7 +48,7 @@ pub(crate) enum Core {
 const N_RIM: u32 = 32;
 
 impl Collider {
-    /// Makes a solid ready.
+    /// Makes a solid ready. A hull whose points span no volume works, too; so does a mesh of any quality.
     ///
     /// # Errors
     ///
@@ -239,8 +239,11 @@ fn cuboid_faces() -> Vec<[u32; 3]> {
         .collect()
 }
 
+/// Corners, edges and faces.
+type Features = (Vec<Point3<f64>>, Vec<[u32; 2]>, Vec<[u32; 3]>);
+
 /// Corners, edges and faces of a prism inscribed in a cylinder about z.
-fn prism(half_length: f64, radius: f64) -> (Vec<Point3<f64>>, Vec<[u32; 2]>, Vec<[u32; 3]>) {
+fn prism(half_length: f64, radius: f64) -> Features {
     let mut corners = Vec::new();
     let (mut edges, mut faces) = (Vec::new(), Vec::new());
     for i in 0..N_RIM {

@@ -87,10 +87,9 @@ impl Surface {
 
     /// The point of the surface that is closest to `p`.
     pub fn closest_point(&self, p: &Point3<f64>) -> SurfacePoint {
-        let (distance, point, triangle) = self
-            .tree()
-            .nearest_point(p, f64::INFINITY)
-            .expect("a mesh has a triangle, and its coordinates are finite");
+        // Coordinates near the end of f64's range make every distance infinite: then any point is as near as another.
+        let first = (f64::INFINITY, self.tree().triangle(0)[0], 0);
+        let (distance, point, triangle) = self.tree().nearest_point(p, f64::INFINITY).unwrap_or(first);
         SurfacePoint {
             point,
             triangle: triangle as usize,
