@@ -32,3 +32,11 @@ pub use shared_volume::union_volume;
 pub use solid::{PlacedSolid, Solid};
 pub use surface::{Hit, Surface, SurfacePoint};
 pub use tetrahedron::Tetrahedron;
+
+mod hull;
+mod planar;
+pub use hull::{ConvexHull, convex_hull};
+pub use planar::planar_hull;
+
+mod min_box;
+pub use min_box::{MinimumBox, minimum_volume_box};
