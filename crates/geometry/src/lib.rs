@@ -12,6 +12,7 @@ mod mass_properties;
 mod mesh;
 mod oriented_box;
 mod parry_bridge;
+mod read;
 mod shared_volume;
 mod simplex;
 mod solid;
@@ -19,6 +20,7 @@ mod solid_shape;
 mod surface;
 mod tetrahedron;
 mod triangle_tree;
+mod write_ply;
 
 pub use collider::{Ball, Collider};
 pub use contact_point::ContactPoint;
@@ -28,6 +30,7 @@ pub use gap::Gap;
 pub use mass_properties::{MassProperties, mass_properties, signed_volume, surface_area, surface_centroid};
 pub use mesh::TriMesh;
 pub use oriented_box::OrientedBox;
+pub use read::{MeshFormat, Shape, read_mesh, read_shape};
 pub use shared_volume::union_volume;
 pub use solid::{PlacedSolid, Solid};
 pub use surface::{Hit, Surface, SurfacePoint};
@@ -40,3 +43,4 @@ pub use planar::planar_hull;
 
 mod min_box;
 pub use min_box::{MinimumBox, minimum_volume_box};
+pub use write_ply::write_ply;
