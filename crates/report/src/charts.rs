@@ -7,7 +7,7 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::theme::Theme;
 
-use crate::figure::{Figure, escape};
+use crate::figure::{Figure, Pen, escape};
 use crate::palette::{ACCENT, INK, MUTED, PAPER, RULE, TASKS};
 
 /// One horizontal bar.
@@ -32,6 +32,9 @@ pub(crate) struct Curve {
 
 /// Horizontal bars from 0, the first on top.
 pub(crate) fn bars(name: &str, alt: &str, unit: &str, bars: &[Bar]) -> Figure {
+    if bars.is_empty() {
+        return Pen::new(480.0, 40.0).finish(name, alt);
+    }
     let plot = bars.iter().rev().fold(
         BarPlot::new().with_horizontal(true).with_width(0.62),
         |plot, bar| plot.with_colored_bar(bar.label.clone(), finite(bar.value), bar.color),
@@ -51,6 +54,9 @@ pub(crate) fn grouped_bars(
     groups: &[String],
     series: &[Series],
 ) -> Figure {
+    if groups.is_empty() || series.is_empty() {
+        return Pen::new(480.0, 40.0).finish(name, alt);
+    }
     let plot = groups
         .iter()
         .enumerate()
@@ -191,5 +197,21 @@ mod tests {
         assert!(bars("x", "", "", &[]).svg.ends_with("</svg>"));
         assert!(grouped_bars("x", "", "", &[], &[]).svg.ends_with("</svg>"));
         assert!(curves("x", "", "", "", &[]).svg.ends_with("</svg>"));
+        let nowhere = Curve {
+            label: String::new(),
+            points: vec![(1.0, f64::NAN)],
+        };
+        assert!(curves("x", "", "", "", &[nowhere]).svg.ends_with("</svg>"));
+        let zero = Bar {
+            label: String::new(),
+            value: 0.0,
+            color: ACCENT,
+        };
+        assert!(bars("x", "", "", &[zero]).svg.ends_with("</svg>"));
+        let flat = Curve {
+            label: "flat".into(),
+            points: vec![(1.0, 0.0), (1.0, 0.0)],
+        };
+        assert!(curves("x", "", "", "", &[flat]).svg.ends_with("</svg>"));
     }
 }

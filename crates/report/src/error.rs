@@ -6,7 +6,7 @@
 pub enum ReportError {
     /// The bytes given as a picture are not a PNG file.
     #[error(
-        "picture `{picture}`: expected a PNG file, found {n_bytes} bytes with no PNG header; encode it with `Raster::to_png`"
+        "picture `{picture}`: expected a PNG file, found {n_bytes} bytes with no PNG header; encode it with `encode_png`"
     )]
     NotPng {
         /// The picture's name.

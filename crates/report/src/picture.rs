@@ -92,7 +92,7 @@ mod tests {
         };
         assert_eq!(
             picture.size().unwrap_err().to_string(),
-            "picture `mug`: expected a PNG file, found 6 bytes with no PNG header; encode it with `Raster::to_png`"
+            "picture `mug`: expected a PNG file, found 6 bytes with no PNG header; encode it with `encode_png`"
         );
         assert_eq!(picture.img(10).into_string(), "");
     }
