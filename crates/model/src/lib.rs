@@ -1,1 +1,58 @@
 //! What follows from evidence in a mixed Bayesian network?
+//!
+//! A [`Network`] says which nodes there are, which arcs, and how each node is to be trained: `network.toml`. A [`Table`]
+//! holds rows. [`train`] makes a [`Model`] of both; a person may also write one by hand: `model.json`. A model answers
+//! [`Model::posterior`] for any nodes, given any [`Evidence`] about others, exactly.
+//!
+//! Discrete nodes have tables. A continuous node is a vector; for each configuration of its discrete parents it has a
+//! mixture of Gaussian linear regressions on its continuous parents. Nodes are just names here: nothing in this crate
+//! knows what a grasp is. It opens no files: texts and bytes come in, texts and bytes go out.
+//!
+//! ```
+//! use prehend_model::{Evidence, Model};
+//!
+//! let model = Model::from_json(r#"{ "format": "prehend-model", "version": 1, "nodes": [
+//!     { "name": "task", "kind": "discrete", "states": ["pour", "use"], "table": [[0.5, 0.5]] },
+//!     { "name": "width", "kind": "gaussian_mixture", "discrete_parents": ["task"], "components": [
+//!         [{ "weight": 1.0, "mean": [0.08], "covariance": [[1e-4]] }],
+//!         [{ "weight": 1.0, "mean": [0.03], "covariance": [[1e-4]] }]] }] }"#)?;
+//! let evidence = Evidence::new().with_value(&model, "width", &[0.07])?;
+//! let answer = model.posterior(&["task"], &evidence)?;
+//! assert!(answer.posterior("task").unwrap()[0] > 0.99);
+//! # Ok::<(), prehend_model::ModelError>(())
+//! ```
+//!
+//! `docs/model-format.md` describes both files, the evidence and the answers.
+
+mod error;
+
+mod network;
+mod table;
+
+mod cpd;
+mod json;
+mod model;
+mod sample;
+
+mod cell;
+mod em;
+mod family;
+mod start;
+mod train;
+
+mod answer;
+mod evidence;
+mod posterior;
+
+mod gaussian;
+mod sphere;
+
+pub use answer::{Answer, Mixture, Target, Term};
+pub use cell::{CellReport, OrderScore};
+pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign};
+pub use error::ModelError;
+pub use evidence::{Evidence, Observation};
+pub use model::{Model, Node};
+pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, Weights};
+pub use table::{Column, Table};
+pub use train::{NodeReport, TrainOptions, TrainReport, Trained, train};

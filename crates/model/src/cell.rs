@@ -1,0 +1,529 @@
+//! One cell: rows of one configuration, and how many components they get.
+//!
+//! ```text
+//! BIC(K) = −2 Σ log p + n_parameters · log n
+//! ```
+//!
+//! n counts what was measured independently. Where the node's own columns are constant within each group (the size of an
+//! object, over all grasps on it), that is the number of groups: the rows are weighted down to it, so that a component
+//! per object never pays. `choose = "bic+cv"` also leaves out whole groups, five folds, and takes the fewest components
+//! whose density on held-out groups is within one standard error of the best.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::cpd::{Sign, n_mixture_parameters};
+use crate::em::{Mixing, Rows, row_log_densities};
+use crate::family::Family;
+use crate::network::{MixtureOrder, MixtureSpec, Weights};
+use crate::start::{FitOptions, Robust, fit_mixture};
+use crate::train::TrainOptions;
+
+/// BIC differences below this are no evidence; the smaller mixture wins.
+const NEAR_TIE: f64 = 2.0;
+/// Rows per free parameter of one component below which BIC is not asked.
+const ROWS_PER_PARAMETER: f64 = 2.0;
+/// Folds of the cross-validation over groups.
+const FOLDS: usize = 5;
+/// Starts of EM in each fold: the curve needs the order right, not the last nat.
+const FOLD_RESTARTS: usize = 2;
+
+/// What to fit.
+pub(crate) struct CellTask<'a> {
+    pub node: usize,
+    /// Configuration of the discrete parents; `None` takes all rows.
+    pub cell: Option<usize>,
+    pub spec: &'a MixtureSpec,
+    pub family: &'a Family,
+    pub options: TrainOptions,
+    pub grouped: bool,
+}
+
+/// What came out.
+pub(crate) struct FittedCell {
+    pub cell: Option<usize>,
+    pub mixing: Mixing,
+    pub report: CellReport,
+    pub warnings: Vec<String>,
+}
+
+/// How one configuration of a continuous node was trained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CellReport {
+    /// Parent and state, for each discrete parent.
+    pub configuration: Vec<(String, String)>,
+    /// Rows in it.
+    pub n_rows: usize,
+    /// Independent measurements in it: rows, or groups where the node is constant within groups. BIC's n.
+    pub n_effective: f64,
+    /// Whether the node is constant within groups here.
+    pub constant_in_groups: bool,
+    /// Components of the mixture.
+    pub components: usize,
+    /// Every number of components that was tried.
+    pub curve: Vec<OrderScore>,
+    /// EM steps of the chosen fit.
+    pub steps: usize,
+    /// Whether EM ended by itself.
+    pub converged: bool,
+    /// Components that lost their rows and were started anew.
+    pub reinitialized: usize,
+    /// Components that lost their rows again and were dropped.
+    pub dropped: usize,
+    /// Whether there were too few rows, so that the fit over all configurations stands in.
+    pub pooled: bool,
+    /// Penalised log-likelihood after each step of the chosen fit: never falls.
+    #[serde(skip)]
+    pub objectives: Vec<f64>,
+}
+
+/// One number of components.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OrderScore {
+    /// Components asked for.
+    pub asked: usize,
+    /// Components that kept their rows.
+    pub components: usize,
+    /// Log-likelihood in standardised units, in independent measurements.
+    pub log_likelihood: f64,
+    /// Free parameters.
+    pub n_parameters: usize,
+    /// −2 log-likelihood + `n_parameters` log `n_effective`; smaller is better.
+    pub bic: f64,
+    /// Mean log density of a held-out group, where cross-validation was asked for.
+    pub held_out: Option<f64>,
+}
+
+impl CellReport {
+    /// ` given task=pouring`, for messages.
+    pub fn label(&self) -> String {
+        let parts: Vec<String> = self
+            .configuration
+            .iter()
+            .map(|(parent, state)| format!("{parent}={state}"))
+            .collect();
+        format!(" given {}", parts.join(", "))
+    }
+    /// BIC of the chosen fit.
+    pub fn bic(&self) -> Option<f64> {
+        self.curve
+            .iter()
+            .find(|score| score.components == self.components)
+            .map(|score| score.bic)
+    }
+}
+
+/// Fits all cells; every number of components of every cell is one piece of parallel work.
+pub(crate) fn fit_cells(tasks: &[CellTask]) -> Vec<FittedCell> {
+    let prepared: Vec<Prepared> = tasks.par_iter().map(Prepared::new).collect();
+    let jobs: Vec<(usize, usize)> = prepared
+        .iter()
+        .enumerate()
+        .flat_map(|(i, cell)| cell.orders.iter().map(move |&k| (i, k)))
+        .collect();
+    // Longest first keeps all threads busy to the end; results come back in the jobs' order.
+    let mut order: Vec<usize> = (0..jobs.len()).collect();
+    order.sort_by_key(|&j| std::cmp::Reverse(prepared[jobs[j].0].rows.n() * jobs[j].1));
+    let fits = in_order(&order, |j| {
+        let (i, k) = jobs[j];
+        let mut rng = stream(&tasks[i], k, 0);
+        fit_mixture(&prepared[i].rows, k, fit_options(&tasks[i].options), &mut rng)
+    });
+    let mut fits_of: Vec<Vec<(usize, Robust)>> = prepared.iter().map(|_| Vec::new()).collect();
+    for ((i, k), fit) in jobs.into_iter().zip(fits) {
+        fits_of[i].push((k, fit));
+    }
+    let chosen: Vec<usize> = prepared
+        .iter()
+        .zip(&fits_of)
+        .map(|(cell, fits)| best_bic(cell, fits))
+        .collect();
+    let held_out = cross_validate(tasks, &prepared, &fits_of, &chosen);
+    let pieces = tasks
+        .iter()
+        .zip(prepared)
+        .zip(fits_of)
+        .zip(chosen.into_iter().zip(held_out));
+    pieces
+        .map(|(((task, cell), fits), (best, held_out))| conclude(task, cell, fits, best, held_out.as_ref()))
+        .collect()
+}
+
+/// Runs the work in the given order, and returns the results in index order.
+fn in_order<T: Send>(order: &[usize], work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut out: Vec<(usize, T)> = order.par_iter().with_max_len(1).map(|&j| (j, work(j))).collect();
+    out.sort_by_key(|(j, _)| *j);
+    out.into_iter().map(|(_, value)| value).collect()
+}
+
+fn fit_options(options: &TrainOptions) -> FitOptions {
+    FitOptions {
+        restarts: options.restarts,
+        max_steps: options.max_steps,
+        tolerance: options.tolerance,
+    }
+}
+
+/// A random stream of its own for every fit: order and threads do not matter.
+fn stream(task: &CellTask, k: usize, fold: usize) -> ChaCha8Rng {
+    let cell = task.cell.map_or(0, |cell| cell + 1);
+    let mut mixed = task.options.seed;
+    for part in [task.node, cell, k, fold] {
+        mixed = (mixed ^ part as u64)
+            .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            .rotate_left(29);
+    }
+    ChaCha8Rng::seed_from_u64(mixed)
+}
+
+struct Prepared {
+    rows: Rows,
+    groups: Option<Vec<usize>>,
+    n_rows: usize,
+    n_effective: f64,
+    constant: bool,
+    pooled: bool,
+    orders: Vec<usize>,
+    warnings: Vec<String>,
+}
+
+impl Prepared {
+    fn new(task: &CellTask) -> Self {
+        let family = task.family;
+        let members: Vec<usize> = (0..family.rows.len())
+            .filter(|&i| task.cell.is_none_or(|cell| family.configurations[i] == cell))
+            .collect();
+        let n_rows = members.len();
+        let own = Self::of(task, &members);
+        let enough = own.n_effective >= own.rows.least_mass() || task.cell.is_none();
+        let mut prepared = own;
+        if !enough {
+            let found = prepared.n_effective;
+            let least = prepared.rows.least_mass();
+            let what = if prepared.constant { "groups" } else { "rows" };
+            prepared = Self::of(task, &(0..family.rows.len()).collect::<Vec<_>>());
+            prepared.pooled = true;
+            prepared.orders = vec![1];
+            prepared.warnings = vec![format!(
+                "{found} {what} are too few for {least} unknowns; took one component over all configurations"
+            )];
+        }
+        prepared.n_rows = n_rows;
+        prepared
+    }
+
+    fn of(task: &CellTask, members: &[usize]) -> Self {
+        let (family, spec) = (task.family, task.spec);
+        let d = spec.columns.len();
+        let q = family.parent_scaling.mean.len();
+        let groups: Option<Vec<usize>> = family
+            .groups
+            .as_ref()
+            .map(|groups| members.iter().map(|&i| groups[i]).collect());
+        let mut weights: Vec<f64> = members.iter().map(|&i| family.weights[i]).collect();
+        let total: f64 = weights.iter().sum();
+        let squares: f64 = weights.iter().map(|w| w * w).sum();
+        let mut n_effective = if squares > 0.0 {
+            total * total / squares
+        } else {
+            0.0
+        };
+        let values: Vec<&Vec<f64>> = members.iter().map(|&i| &family.y[i]).collect();
+        let constant = groups.as_ref().is_some_and(|groups| is_constant(&values, groups));
+        let mut warnings = Vec::new();
+        if constant {
+            let mut distinct = groups.clone().unwrap_or_default();
+            distinct.sort_unstable();
+            distinct.dedup();
+            n_effective = distinct.len() as f64;
+        } else if groups.is_none() && repeats(&values) {
+            warnings.push(
+                "most values repeat exactly; if they were measured once per object, say which column names it (group)"
+                    .into(),
+            );
+        }
+        if total > 0.0 {
+            for weight in &mut weights {
+                *weight *= n_effective / total;
+            }
+        }
+        let z = faer::Mat::from_fn(d + 1 + q, members.len(), |i, j| {
+            let row = members[j];
+            match i {
+                _ if i < d => family.y[row][i],
+                _ if i == d => 1.0,
+                _ => family.p[row][i - d - 1],
+            }
+        });
+        let shared = spec.weights == Weights::Shared && task.cell.is_none();
+        let cell = members
+            .iter()
+            .map(|&i| if shared { family.configurations[i] } else { 0 })
+            .collect();
+        let floor = spec
+            .noise_floor
+            .iter()
+            .zip(&family.scaling.standard_deviation)
+            .map(|(f, s)| f / s)
+            .collect();
+        let rows = Rows {
+            d,
+            z,
+            weights,
+            cell,
+            n_cells: if shared { family.n_configurations } else { 1 },
+            floor,
+            latent_sign: spec.sign == Sign::Latent,
+        };
+        let orders = orders(spec, &rows, n_effective, constant);
+        let n_rows = rows.n();
+        Self {
+            rows,
+            groups,
+            n_rows,
+            n_effective,
+            constant,
+            pooled: false,
+            orders,
+            warnings,
+        }
+    }
+}
+
+/// Numbers of components to try.
+fn orders(spec: &MixtureSpec, rows: &Rows, n_effective: f64, constant: bool) -> Vec<usize> {
+    let one = n_mixture_parameters(1, rows.d, rows.q()) as f64;
+    let per_component = if constant {
+        rows.least_mass()
+    } else {
+        (ROWS_PER_PARAMETER * one).max(rows.least_mass())
+    };
+    let most = ((n_effective / per_component) as usize).max(1);
+    match spec.order {
+        MixtureOrder::Fixed(k) => vec![k.min(((n_effective / rows.least_mass()) as usize).max(1))],
+        MixtureOrder::Bic { max, .. } => (1..=max.min(most)).collect(),
+    }
+}
+
+/// Whether every group has one value, and some group has several rows.
+fn is_constant(values: &[&Vec<f64>], groups: &[usize]) -> bool {
+    let mut first = std::collections::BTreeMap::new();
+    for (value, group) in values.iter().zip(groups) {
+        let known = *first.entry(*group).or_insert(*value);
+        // In standardised units: what a text file's sixth digit may change.
+        if known.iter().zip(*value).any(|(a, b)| (a - b).abs() > 1e-5) {
+            return false;
+        }
+    }
+    first.len() < values.len()
+}
+
+/// Whether rows outnumber distinct values three to one.
+fn repeats(values: &[&Vec<f64>]) -> bool {
+    let distinct: std::collections::BTreeSet<Vec<u64>> = values
+        .iter()
+        .map(|value| value.iter().map(|v| v.to_bits()).collect())
+        .collect();
+    values.len() >= 30 && 3 * distinct.len() < values.len()
+}
+
+fn score(cell: &Prepared, asked: usize, fit: &Robust) -> OrderScore {
+    let components = fit.fit.mixing.components.len();
+    let gaussians = n_mixture_parameters(components, cell.rows.d, cell.rows.q()) - (components - 1);
+    let n_parameters = gaussians + cell.rows.n_cells * (components - 1);
+    let log_likelihood = fit.fit.log_likelihood;
+    let bic = -2.0 * log_likelihood + n_parameters as f64 * cell.n_effective.max(1.0).ln();
+    OrderScore {
+        asked,
+        components,
+        log_likelihood,
+        n_parameters,
+        bic,
+        held_out: None,
+    }
+}
+
+/// Position of the fit with the least BIC, near ties to fewer components.
+fn best_bic(cell: &Prepared, fits: &[(usize, Robust)]) -> usize {
+    let bics: Vec<f64> = fits.iter().map(|(k, fit)| score(cell, *k, fit).bic).collect();
+    let least = bics.iter().copied().fold(f64::INFINITY, f64::min);
+    bics.iter().position(|bic| *bic <= least + NEAR_TIE).unwrap_or(0)
+}
+
+/// Held-out log densities per group and number of components, for cells that ask for them.
+type HeldOut = Vec<Vec<f64>>;
+
+fn cross_validate(
+    tasks: &[CellTask],
+    prepared: &[Prepared],
+    fits: &[Vec<(usize, Robust)>],
+    chosen: &[usize],
+) -> Vec<Option<HeldOut>> {
+    let mut jobs = Vec::new();
+    let mut folds_of = Vec::with_capacity(tasks.len());
+    for (i, task) in tasks.iter().enumerate() {
+        let wanted = matches!(task.spec.order, MixtureOrder::Bic { guard: true, .. }) && task.grouped;
+        let folds = if wanted && chosen[i] > 0 {
+            folds(task, &prepared[i])
+        } else {
+            Vec::new()
+        };
+        for fold in 0..folds.len() {
+            for (k, _) in &fits[i][..=chosen[i]] {
+                jobs.push((i, fold, *k));
+            }
+        }
+        folds_of.push(folds);
+    }
+    let mut order: Vec<usize> = (0..jobs.len()).collect();
+    order.sort_by_key(|&j| std::cmp::Reverse(prepared[jobs[j].0].rows.n() * jobs[j].2));
+    let scores = in_order(&order, |j| {
+        let (i, fold, k) = jobs[j];
+        held_out(&tasks[i], &prepared[i], &folds_of[i][fold], k, fold)
+    });
+    let mut out: Vec<Option<HeldOut>> = folds_of
+        .iter()
+        .zip(chosen)
+        .map(|(folds, &best)| (!folds.is_empty()).then(|| vec![Vec::new(); best + 1]))
+        .collect();
+    for ((i, _, k), groups) in jobs.into_iter().zip(scores) {
+        let position = fits[i].iter().position(|(asked, _)| *asked == k).unwrap_or(0);
+        if let Some(held_out) = &mut out[i] {
+            held_out[position].extend(groups);
+        }
+    }
+    out
+}
+
+/// Rows of each fold; groups stay whole. None where there are too few groups.
+fn folds(task: &CellTask, cell: &Prepared) -> Vec<Vec<usize>> {
+    let Some(groups) = &cell.groups else {
+        return Vec::new();
+    };
+    let mut distinct = groups.clone();
+    distinct.sort_unstable();
+    distinct.dedup();
+    if distinct.len() < 3 {
+        return Vec::new();
+    }
+    distinct.shuffle(&mut stream(task, 0, usize::MAX));
+    let n = FOLDS.min(distinct.len());
+    let mut out = vec![Vec::new(); n];
+    for (row, group) in groups.iter().enumerate() {
+        let place = distinct.iter().position(|other| other == group).unwrap_or(0);
+        out[place % n].push(row);
+    }
+    out
+}
+
+/// Fits without a fold, and returns the mean log density of each of its groups.
+fn held_out(task: &CellTask, cell: &Prepared, fold: &[usize], k: usize, number: usize) -> Vec<f64> {
+    let Some(groups) = &cell.groups else {
+        return Vec::new();
+    };
+    let train: Vec<usize> = (0..cell.rows.n()).filter(|row| !fold.contains(row)).collect();
+    let options = FitOptions {
+        restarts: FOLD_RESTARTS,
+        ..fit_options(&task.options)
+    };
+    let fit = fit_mixture(
+        &cell.rows.select(&train),
+        k,
+        options,
+        &mut stream(task, k, number + 1),
+    );
+    let density = row_log_densities(&cell.rows.select(fold), &fit.fit.mixing);
+    let mut sums: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
+    for (&row, density) in fold.iter().zip(density) {
+        let (sum, mass) = sums.entry(groups[row]).or_default();
+        *sum += cell.rows.weights[row] * density;
+        *mass += cell.rows.weights[row];
+    }
+    sums.into_values().map(|(sum, mass)| sum / mass).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The fewest components whose held-out density is within one standard error, by group, of the best.
+fn best_held_out(held_out: &HeldOut) -> usize {
+    let means: Vec<f64> = held_out.iter().map(|groups| mean(groups)).collect();
+    let best = (0..means.len()).fold(0, |best, i| if means[i] > means[best] { i } else { best });
+    (0..best)
+        .find(|&i| {
+            let lost: Vec<f64> = held_out[best]
+                .iter()
+                .zip(&held_out[i])
+                .map(|(a, b)| a - b)
+                .collect();
+            let center = mean(&lost);
+            let variance =
+                lost.iter().map(|l| (l - center) * (l - center)).sum::<f64>() / (lost.len() as f64 - 1.0);
+            center <= (variance / lost.len() as f64).sqrt()
+        })
+        .unwrap_or(best)
+}
+
+fn conclude(
+    task: &CellTask,
+    cell: Prepared,
+    mut fits: Vec<(usize, Robust)>,
+    by_bic: usize,
+    held_out: Option<&HeldOut>,
+) -> FittedCell {
+    let mut curve: Vec<OrderScore> = fits.iter().map(|(k, fit)| score(&cell, *k, fit)).collect();
+    let mut best = by_bic;
+    if let Some(held_out) = held_out {
+        for (score, groups) in curve.iter_mut().zip(held_out) {
+            score.held_out = Some(mean(groups));
+        }
+        best = best_held_out(held_out);
+    }
+    let (asked, chosen) = fits.swap_remove(best);
+    let components = chosen.fit.mixing.components.len();
+    let mut warnings = cell.warnings;
+    if chosen.dropped > 0 && matches!(task.spec.order, MixtureOrder::Fixed(_)) {
+        warnings.push(format!(
+            "{components} of {asked} components kept their rows; the others were dropped"
+        ));
+    }
+    if let MixtureOrder::Fixed(k) = task.spec.order
+        && asked < k
+        && !cell.pooled
+    {
+        warnings.push(format!(
+            "{} measurements carry {asked} of {k} components",
+            cell.n_effective
+        ));
+    }
+    if !chosen.fit.converged {
+        warnings.push(format!(
+            "EM ended after {} steps without settling",
+            chosen.fit.objectives.len() - 1
+        ));
+    }
+    let report = CellReport {
+        configuration: Vec::new(),
+        n_rows: cell.n_rows,
+        n_effective: cell.n_effective,
+        constant_in_groups: cell.constant,
+        components,
+        curve,
+        steps: chosen.fit.objectives.len() - 1,
+        converged: chosen.fit.converged,
+        reinitialized: chosen.reinitialized,
+        dropped: chosen.dropped,
+        pooled: cell.pooled,
+        objectives: chosen.fit.objectives,
+    };
+    FittedCell {
+        cell: task.cell,
+        mixing: chosen.fit.mixing,
+        report,
+        warnings,
+    }
+}

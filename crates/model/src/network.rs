@@ -1,0 +1,393 @@
+//! `network.toml`: which nodes there are, which arcs, and how each is to be trained.
+
+use std::collections::BTreeSet;
+
+use serde::Deserialize;
+
+use crate::cpd::Sign;
+use crate::error::{ModelError, list};
+use crate::model::{check_columns, topological_order};
+
+/// Structure and training settings of a network, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network {
+    nodes: Vec<NodeSpec>,
+    group: Option<String>,
+    order: Vec<usize>,
+}
+
+/// One node of a [`Network`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeSpec {
+    /// Name, unique.
+    pub name: String,
+    /// Discrete or continuous, with its settings.
+    pub kind: NodeKind,
+    /// Positions of the parents, in the file's order.
+    pub parents: Vec<usize>,
+}
+
+/// Discrete or continuous, with its settings.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NodeKind {
+    /// A node with states.
+    Discrete {
+        /// Names of the states.
+        states: Vec<String>,
+        /// Pseudo-count of each state (Dirichlet prior), at least 0.
+        prior: f64,
+    },
+    /// A vector with a mixture of linear regressions per configuration of its discrete parents.
+    Mixture(MixtureSpec),
+}
+
+/// Settings of a continuous node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MixtureSpec {
+    /// Column of each dimension.
+    pub columns: Vec<String>,
+    /// How many components.
+    pub order: MixtureOrder,
+    /// Which configurations share components or weights.
+    pub weights: Weights,
+    /// Smallest standard deviation of each column, in its unit; 0 for none.
+    pub noise_floor: Vec<f64>,
+    /// Whether q and −q are the same value.
+    pub sign: Sign,
+    /// Whether the values are unit vectors.
+    pub sphere: bool,
+}
+
+/// How many components a mixture gets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MixtureOrder {
+    /// Exactly this many, fewer only where a cell has too few rows.
+    Fixed(usize),
+    /// Between 1 and `max`, by the least BIC; with `guard`, no more than cross-validation over groups bears out.
+    Bic {
+        /// Most components to try.
+        max: usize,
+        /// Whether cross-validation over groups has a say.
+        guard: bool,
+    },
+}
+
+/// Where the latent component variable of a continuous node hangs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weights {
+    /// Each configuration of the discrete parents has its own weights and components.
+    #[default]
+    PerConfiguration,
+    /// The component depends on the discrete parents, the components are the same for all.
+    Shared,
+    /// The component is independent of the discrete parents, each configuration has its own Gaussians.
+    Root,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNetwork {
+    group: Option<String>,
+    #[serde(default)]
+    node: Vec<RawNode>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNode {
+    name: String,
+    kind: Kind,
+    states: Option<Vec<String>>,
+    prior: Option<f64>,
+    columns: Option<Vec<String>>,
+    #[serde(default)]
+    parents: Vec<String>,
+    mixture: Option<RawMixture>,
+    weights: Option<Weights>,
+    noise_floor: Option<Floor>,
+    sign: Option<Sign>,
+    sphere: Option<bool>,
+}
+
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Discrete,
+    GaussianMixture,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMixture {
+    components: Option<usize>,
+    max: Option<usize>,
+    choose: Option<Choose>,
+    weights: Option<Weights>,
+}
+
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+enum Choose {
+    #[serde(rename = "bic")]
+    Bic,
+    #[serde(rename = "bic+cv")]
+    BicCv,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Floor {
+    One(f64),
+    Each(Vec<f64>),
+}
+
+/// Components tried where a node has no `mixture` key.
+const DEFAULT_MAX: usize = 8;
+/// Pseudo-count of each state where a discrete node has no `prior` key: Laplace's rule, so that no state is impossible.
+const DEFAULT_PRIOR: f64 = 1.0;
+
+impl Network {
+    /// Reads `network.toml` (keys: `docs/model-format.md`).
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::NetworkFile`] with the line where the text is not TOML or a key is unknown; otherwise what is wrong
+    /// with which node: unknown parents, cycles, a continuous parent of a discrete node, a column used twice, settings
+    /// out of range.
+    pub fn from_toml(text: &str) -> Result<Self, ModelError> {
+        let raw: RawNetwork = toml::from_str(text).map_err(|e| ModelError::NetworkFile {
+            problem: e.to_string().trim_end().to_string(),
+        })?;
+        if raw.node.is_empty() {
+            return Err(ModelError::NetworkFile {
+                problem: "there is no [[node]]".into(),
+            });
+        }
+        let names: Vec<String> = raw.node.iter().map(|node| node.name.clone()).collect();
+        let mut seen = BTreeSet::new();
+        if let Some(node) = names.iter().find(|name| !seen.insert(name.as_str())) {
+            return Err(ModelError::DuplicateNode { node: node.clone() });
+        }
+        let kinds: Vec<Kind> = raw.node.iter().map(|node| node.kind).collect();
+        let mut nodes = Vec::with_capacity(names.len());
+        for node in raw.node {
+            nodes.push(node.build(&names, &kinds)?);
+        }
+        let labels: Vec<&str> = names.iter().map(String::as_str).collect();
+        let parents: Vec<Vec<usize>> = nodes.iter().map(|node| node.parents.clone()).collect();
+        let order = topological_order(&labels, &parents)?;
+        check_columns(nodes.iter().map(|node| (node.name.as_str(), node.columns())))?;
+        Ok(Self {
+            nodes,
+            group: raw.group,
+            order,
+        })
+    }
+
+    /// The nodes, in the file's order.
+    pub fn nodes(&self) -> &[NodeSpec] {
+        &self.nodes
+    }
+
+    /// Column whose values mark rows that belong together (`group` in the file), for example the object.
+    pub fn group(&self) -> Option<&str> {
+        self.group.as_deref()
+    }
+
+    /// Positions of the nodes such that parents come first.
+    pub fn order(&self) -> &[usize] {
+        &self.order
+    }
+
+    /// All columns that training reads.
+    pub fn columns(&self) -> Vec<String> {
+        self.nodes.iter().flat_map(NodeSpec::columns).collect()
+    }
+}
+
+impl NodeSpec {
+    /// Columns of a table that hold this node's values: a discrete node's column has its name.
+    pub fn columns(&self) -> Vec<String> {
+        match &self.kind {
+            NodeKind::Discrete { .. } => vec![self.name.clone()],
+            NodeKind::Mixture(spec) => spec.columns.clone(),
+        }
+    }
+}
+
+impl RawNode {
+    fn build(self, names: &[String], kinds: &[Kind]) -> Result<NodeSpec, ModelError> {
+        let mut parents = Vec::with_capacity(self.parents.len());
+        for parent in &self.parents {
+            let Some(position) = names.iter().position(|name| name == parent) else {
+                return Err(ModelError::UnknownParent {
+                    node: self.name.clone(),
+                    parent: parent.clone(),
+                    known: list(names.iter().map(String::as_str)),
+                });
+            };
+            if parents.contains(&position) {
+                return Err(self.bad("parents", &format!("`{parent}` twice"), "each parent once"));
+            }
+            if self.kind == Kind::Discrete && kinds[position] == Kind::GaussianMixture {
+                return Err(ModelError::ContinuousParent {
+                    node: self.name.clone(),
+                    parent: parent.clone(),
+                });
+            }
+            parents.push(position);
+        }
+        let kind = match self.kind {
+            Kind::Discrete => self.discrete()?,
+            Kind::GaussianMixture => NodeKind::Mixture(self.mixture_spec()?),
+        };
+        Ok(NodeSpec {
+            name: self.name,
+            kind,
+            parents,
+        })
+    }
+
+    fn bad(&self, key: &str, found: &str, expected: &str) -> ModelError {
+        ModelError::BadSetting {
+            node: self.name.clone(),
+            key: key.into(),
+            found: found.into(),
+            expected: expected.into(),
+        }
+    }
+
+    fn discrete(&self) -> Result<NodeKind, ModelError> {
+        let foreign = [
+            ("columns", self.columns.is_some()),
+            ("mixture", self.mixture.is_some()),
+            ("weights", self.weights.is_some()),
+            ("noise_floor", self.noise_floor.is_some()),
+            ("sign", self.sign.is_some()),
+            ("sphere", self.sphere.is_some()),
+        ];
+        if let Some((key, _)) = foreign.iter().find(|(_, given)| *given) {
+            return Err(self.bad(key, "given", "no such key in a discrete node"));
+        }
+        let states = self.states.clone().unwrap_or_default();
+        let distinct: BTreeSet<&String> = states.iter().collect();
+        if states.is_empty() || distinct.len() < states.len() {
+            let found = list(states.iter().map(String::as_str));
+            return Err(self.bad("states", &found, "at least one state, each with its own name"));
+        }
+        let prior = self.prior.unwrap_or(DEFAULT_PRIOR);
+        if !(prior >= 0.0 && prior.is_finite()) {
+            return Err(self.bad("prior", &prior.to_string(), "a pseudo-count of at least 0"));
+        }
+        Ok(NodeKind::Discrete { states, prior })
+    }
+
+    fn mixture_spec(&self) -> Result<MixtureSpec, ModelError> {
+        let foreign = [("states", self.states.is_some()), ("prior", self.prior.is_some())];
+        if let Some((key, _)) = foreign.iter().find(|(_, given)| *given) {
+            return Err(self.bad(key, "given", "no such key in a continuous node"));
+        }
+        let columns = self.columns.clone().unwrap_or_else(|| vec![self.name.clone()]);
+        if columns.is_empty() {
+            return Err(self.bad("columns", "empty", "one column per dimension"));
+        }
+        let noise_floor = match &self.noise_floor {
+            None => vec![0.0; columns.len()],
+            Some(Floor::One(floor)) => vec![*floor; columns.len()],
+            Some(Floor::Each(floors)) => floors.clone(),
+        };
+        if noise_floor.len() != columns.len() || noise_floor.iter().any(|f| !(*f >= 0.0 && f.is_finite())) {
+            let expected = "one number of at least 0, or one per column";
+            return Err(self.bad("noise_floor", &format!("{noise_floor:?}"), expected));
+        }
+        let sign = self.sign.unwrap_or_default();
+        let sphere = self.sphere.unwrap_or(false);
+        if sphere && columns.len() < 2 {
+            return Err(self.bad("sphere", "true for one column", "a node of at least two columns"));
+        }
+        let in_mixture = self.mixture.as_ref().and_then(|mixture| mixture.weights);
+        let weights = self.weights.or(in_mixture).unwrap_or_default();
+        Ok(MixtureSpec {
+            columns,
+            order: self.mixture_order()?,
+            weights,
+            noise_floor,
+            sign,
+            sphere,
+        })
+    }
+
+    fn mixture_order(&self) -> Result<MixtureOrder, ModelError> {
+        let guarded = |max, choose| MixtureOrder::Bic {
+            max,
+            guard: choose == Choose::BicCv,
+        };
+        let Some(raw) = &self.mixture else {
+            return Ok(guarded(DEFAULT_MAX, Choose::Bic));
+        };
+        match (raw.components, raw.max, raw.choose) {
+            (Some(k), None, None) if k >= 1 => Ok(MixtureOrder::Fixed(k)),
+            (None, max, choose) if max.unwrap_or(DEFAULT_MAX) >= 1 => {
+                Ok(guarded(max.unwrap_or(DEFAULT_MAX), choose.unwrap_or(Choose::Bic)))
+            }
+            _ => Err(self.bad(
+                "mixture",
+                "neither of its two forms",
+                "{ components = K } or { max = K, choose = \"bic\" | \"bic+cv\" } with K of at least 1",
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(text: &str) -> String {
+        Network::from_toml(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_scalar_node_takes_its_name_as_column() {
+        let network = Network::from_toml(
+            "[[node]]\nname = \"task\"\nkind = \"discrete\"\nstates = [\"a\", \"b\"]\n\
+             [[node]]\nname = \"cvex\"\nkind = \"gaussian_mixture\"\nparents = [\"task\"]\n\
+             mixture = { max = 4, choose = \"bic\" }\nnoise_floor = 0.02\n",
+        )
+        .unwrap();
+        assert_eq!(network.columns(), ["task", "cvex"]);
+        let NodeKind::Mixture(spec) = &network.nodes()[1].kind else {
+            panic!("cvex is continuous")
+        };
+        assert_eq!(spec.order, MixtureOrder::Bic { max: 4, guard: false });
+        assert_eq!(spec.noise_floor, [0.02]);
+    }
+
+    #[test]
+    fn a_wrong_network_is_refused_with_what_to_change() {
+        let node = |name: &str, rest: &str| format!("[[node]]\nname = \"{name}\"\nkind = {rest}\n");
+        let gauss =
+            |name: &str, parents: &str| node(name, &format!("\"gaussian_mixture\"\nparents = [{parents}]"));
+        assert_eq!(
+            problem(&(gauss("a", "\"b\"") + &gauss("b", "\"a\""))),
+            "arcs form a cycle through `a`; remove one of its incoming arcs"
+        );
+        assert_eq!(
+            problem(&gauss("a", "\"z\"")),
+            "`a` names the parent `z`, which is not a node; the nodes are `a`"
+        );
+        let task = node("task", "\"discrete\"\nstates = [\"x\"]\nparents = [\"a\"]");
+        assert!(
+            problem(&(task + &gauss("a", "")))
+                .starts_with("`task` is discrete and has the continuous parent `a`")
+        );
+        let twice = gauss("a", "") + &node("b", "\"gaussian_mixture\"\ncolumns = [\"a\"]");
+        assert!(problem(&twice).starts_with("the column `a` is used by `a` and by `b`"));
+        let zero = node("a", "\"gaussian_mixture\"\nmixture = { components = 0 }");
+        assert!(problem(&zero).contains("`mixture` is neither of its two forms"));
+        assert!(
+            problem("[[node]]\nname = \"a\"\nkind = \"gaussian_mixture\"\ncolour = 3\n").contains("colour")
+        );
+        assert_eq!(problem(""), "network file: there is no [[node]]");
+    }
+}
