@@ -1,6 +1,6 @@
 //! The solids of a link, from its `<collision>` and `<visual>` elements.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::{PlacedSolid, Solid};
 use urdf_rs::Geometry;
 
@@ -34,6 +34,7 @@ impl<'a> ShapeReader<'a> {
             let link_from_solid = pose(&element.origin, place)?;
             collision.push(self.read_solid(&raw.name, &element.geometry, link_from_solid)?);
         }
+        let collision = merge_capsules(collision);
         let mut visual = Vec::with_capacity(raw.visual.len());
         for element in &raw.visual {
             let link_from_solid = pose(&element.origin, place)?;
@@ -117,6 +118,39 @@ impl<'a> ShapeReader<'a> {
             reason: "mesh files are not read yet; use boxes, capsules, cylinders and spheres".into(),
         })
     }
+}
+
+/// Turns every cylinder with a ball of its radius about each end into a capsule: plain URDF has no word for one.
+fn merge_capsules(solids: Vec<PlacedSolid>) -> Vec<PlacedSolid> {
+    let mut kept = solids;
+    let mut at = 0;
+    while at < kept.len() {
+        if let Solid::Cylinder { half_length, radius } = kept[at].solid {
+            let close = 1e-4 * radius;
+            let ball_at = |z: f64| {
+                let end = kept[at].link_from_solid * Point3::new(0.0, 0.0, z);
+                kept.iter().position(|other| match other.solid {
+                    Solid::Sphere { radius: r } => {
+                        let center = Point3::from(other.link_from_solid.translation.vector);
+                        (r - radius).abs() <= close && (center - end).norm() <= close
+                    }
+                    _ => false,
+                })
+            };
+            if let (Some(a), Some(b)) = (ball_at(-half_length), ball_at(half_length)) {
+                kept[at].solid = Solid::Capsule { half_length, radius };
+                let cylinder = at;
+                let mut idx = 0;
+                kept.retain(|_| {
+                    idx += 1;
+                    idx - 1 != a && idx - 1 != b
+                });
+                at = cylinder - usize::from(a < cylinder) - usize::from(b < cylinder);
+            }
+        }
+        at += 1;
+    }
+    kept
 }
 
 fn positive(link: &str, what: &'static str, numbers: &[f64]) -> Result<(), HandError> {

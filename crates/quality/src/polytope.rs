@@ -66,13 +66,17 @@ impl Polytope {
         self.tolerance = tolerance;
         self.round = 0;
         for left_out in 0..7_u32 {
-            let corners: [u32; 6] = std::array::from_fn(|i| {
+            let mut corners: [u32; 6] = std::array::from_fn(|i| {
                 if (i as u32) < left_out {
                     i as u32
                 } else {
                     i as u32 + 1
                 }
             });
+            // The boundary of a simplex takes alternating signs; with this swap all facets turn the same way.
+            if left_out % 2 == 1 {
+                corners.swap(0, 1);
+            }
             let Some(plane) = self.plane_through(&corners) else {
                 self.facets.clear();
                 self.created.clear();
@@ -119,13 +123,17 @@ impl Polytope {
             .any(|&c| self.points[c as usize] == *point)
     }
 
-    /// Sum of the volumes of the pyramids from the inside point to the facets.
+    /// Sum of the signed volumes of the pyramids from the inside point to the facets.
+    ///
+    /// The corners of every facet are in the order that one orientation of the surface gives them (a new facet takes
+    /// its point in place of the corner that it covers). Where many points lie in one plane, slivers may fold over
+    /// each other; with signs, the folds cancel.
     pub(crate) fn volume(&self) -> f64 {
         let pyramids = self.facets.iter().filter(|f| f.alive).map(|f| {
             let edges = f.corners.map(|c| sub(&self.points[c as usize], &self.inside));
-            nalgebra::Matrix6::from_fn(|r, c| edges[r][c]).determinant().abs()
+            nalgebra::Matrix6::from_fn(|r, c| edges[r][c]).determinant()
         });
-        pyramids.sum::<f64>() / 720.0
+        pyramids.sum::<f64>().abs() / 720.0
     }
 
     /// Adds a point that stands over the facet `start`; [`Self::created`] then lists the new facets.

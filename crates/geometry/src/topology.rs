@@ -1,0 +1,150 @@
+//! Which triangles meet along which edges, by position rather than by index.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Point3;
+
+use crate::TriMesh;
+
+/// Per vertex, the first vertex with the same coordinates (0 and −0 are the same).
+pub(crate) fn position_ids(vertices: &[Point3<f64>]) -> Vec<u32> {
+    let key = |v: u32| {
+        vertices[v as usize]
+            .coords
+            .map(|c| if c == 0.0 { 0 } else { c.to_bits() })
+    };
+    let mut order: Vec<u32> = (0..vertices.len() as u32).collect();
+    order.sort_unstable_by_key(|&v| {
+        let bits = key(v);
+        (bits.x, bits.y, bits.z, v)
+    });
+    let mut ids = vec![0; vertices.len()];
+    let mut first = 0;
+    for (rank, &vertex) in order.iter().enumerate() {
+        if rank == 0 || key(order[rank - 1]) != key(vertex) {
+            first = vertex;
+        }
+        ids[vertex as usize] = first;
+    }
+    ids
+}
+
+/// The mesh's triangles by position ids, and whether two corners of each coincide.
+pub(crate) fn position_triangles(mesh: &TriMesh) -> Vec<[u32; 3]> {
+    let ids = position_ids(mesh.vertices());
+    mesh.triangles()
+        .iter()
+        .map(|t| t.map(|v| ids[v as usize]))
+        .collect()
+}
+
+/// Whether two corners are one: such a triangle has no area and no normal, and takes part in no edge.
+pub(crate) fn is_collapsed([a, b, c]: [u32; 3]) -> bool {
+    a == b || b == c || c == a
+}
+
+/// One triangle at an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Side {
+    pub triangle: usize,
+    /// Whether the triangle runs along the edge from its lower vertex to its higher one.
+    pub upward: bool,
+}
+
+/// Edges from lower to higher vertex, in order, with the triangles along each; collapsed triangles left out.
+pub(crate) struct Edges {
+    ends: Vec<[u32; 2]>,
+    starts: Vec<usize>,
+    sides: Vec<Side>,
+}
+
+impl Edges {
+    pub fn new(triangles: &[[u32; 3]]) -> Self {
+        let mut all: Vec<([u32; 2], Side)> = Vec::with_capacity(triangles.len() * 3);
+        for (triangle, &corners) in triangles.iter().enumerate().filter(|(_, t)| !is_collapsed(**t)) {
+            for k in 0..3 {
+                let (from, to) = (corners[k], corners[(k + 1) % 3]);
+                all.push((
+                    [from.min(to), from.max(to)],
+                    Side {
+                        triangle,
+                        upward: from < to,
+                    },
+                ));
+            }
+        }
+        all.sort_unstable();
+        let mut ends = Vec::new();
+        let mut starts = Vec::new();
+        for (index, (edge, _)) in all.iter().enumerate() {
+            if ends.last() != Some(edge) {
+                ends.push(*edge);
+                starts.push(index);
+            }
+        }
+        starts.push(all.len());
+        Self {
+            ends,
+            starts,
+            sides: all.into_iter().map(|(_, side)| side).collect(),
+        }
+    }
+
+    /// Each edge's lower and higher vertex, and the triangles along it.
+    pub fn iter(&self) -> impl Iterator<Item = ([u32; 2], &[Side])> {
+        self.ends
+            .iter()
+            .zip(self.starts.windows(2))
+            .map(|(&ends, range)| (ends, &self.sides[range[0]..range[1]]))
+    }
+}
+
+/// Groups of items that links join, directly or through others; numbered in the order of their first item.
+pub(crate) struct Groups {
+    parent: Vec<usize>,
+}
+
+impl Groups {
+    pub fn new(n_items: usize) -> Self {
+        Self {
+            parent: (0..n_items).collect(),
+        }
+    }
+
+    pub fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        // The lower item stays root, so that numbering does not depend on the order of the links.
+        self.parent[a.max(b)] = a.min(b);
+    }
+
+    /// The lowest item of the group.
+    pub fn root(&mut self, item: usize) -> usize {
+        let mut item = item;
+        while self.parent[item] != item {
+            self.parent[item] = self.parent[self.parent[item]];
+            item = self.parent[item];
+        }
+        item
+    }
+
+    /// Items by group, groups and items in order; items for which `keep` is false are left out.
+    pub fn members(&mut self, keep: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+        let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for item in (0..self.parent.len()).filter(|&item| keep(item)) {
+            let root = self.root(item);
+            groups.entry(root).or_default().push(item);
+        }
+        groups.into_values().collect()
+    }
+}
+
+/// Triangles joined by shared edges; collapsed ones belong nowhere.
+pub(crate) fn components(triangles: &[[u32; 3]], edges: &Edges) -> Vec<Vec<usize>> {
+    let mut groups = Groups::new(triangles.len());
+    for (_, sides) in edges.iter() {
+        for pair in sides.windows(2) {
+            groups.join(pair[0].triangle, pair[1].triangle);
+        }
+    }
+    groups.members(|triangle| !is_collapsed(triangles[triangle]))
+}
