@@ -4,6 +4,7 @@ mod between_solids;
 mod closest;
 mod collider;
 mod contact_point;
+mod depth;
 mod distance_grid;
 mod enclosure;
 mod error;
@@ -23,7 +24,6 @@ mod surface;
 mod tetrahedron;
 mod topology;
 mod triangle_tree;
-mod twofold;
 mod write_ply;
 
 pub use collider::{Ball, Collider};
