@@ -1,0 +1,62 @@
+//! The hand comes in along its palm's z axis until something touches.
+
+use nalgebra::{Isometry3, Translation3, Vector3};
+
+use crate::GraspObject;
+use crate::first_touch::{Motion, Track, first_touch};
+use crate::grasp_hand::GraspHand;
+
+/// Slides an open hand along a straight line.
+pub(crate) struct Approach<'a> {
+    pub(crate) hand: &'a GraspHand<'a>,
+    pub(crate) object: &'a GraspObject,
+    /// Pose of each solid at s = 0, object frame.
+    pub(crate) start: Vec<Isometry3<f64>>,
+    /// Unit direction, object frame.
+    pub(crate) direction: Vector3<f64>,
+}
+
+/// Where the approach ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Arrival {
+    /// Distance travelled, metres.
+    pub(crate) travelled: f64,
+    /// The solid that touches, if any.
+    pub(crate) solid: Option<usize>,
+}
+
+impl Approach<'_> {
+    /// Travels up to `farthest`; `None` where the hand overlaps the object at the start.
+    pub(crate) fn run(&self, farthest: f64) -> Option<Arrival> {
+        let mut tracks = vec![Track::apart_at(0.0); self.hand.solids.len()];
+        let touch = first_touch(self, &mut tracks, farthest).ok()?;
+        Some(Arrival {
+            travelled: touch.s,
+            solid: touch.pair,
+        })
+    }
+
+    fn pose(&self, solid: usize, s: f64) -> Isometry3<f64> {
+        Translation3::from(self.direction * s) * self.start[solid]
+    }
+}
+
+impl Motion for Approach<'_> {
+    fn gap(&self, i: usize, s: f64, cutoff: f64) -> f64 {
+        let gap = self
+            .object
+            .surface()
+            .gap(&self.hand.solids[i].collider, &self.pose(i, s), cutoff);
+        gap.map_or(cutoff, |g| g.distance)
+    }
+
+    fn gap_lower_bound(&self, i: usize, s: f64) -> f64 {
+        self.object
+            .surface()
+            .gap_lower_bound(&self.hand.solids[i].collider, &self.pose(i, s))
+    }
+
+    fn speed(&self, _: usize) -> f64 {
+        1.0
+    }
+}

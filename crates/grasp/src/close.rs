@@ -1,0 +1,184 @@
+//! A user's own candidate: closed and measured as ours are.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_hand::{Hand, JointPositions};
+use prehend_quality::EpsilonSolver;
+
+use crate::closing::{Posture, close_fingers, self_collides};
+use crate::contacts::contacts_of;
+use crate::grasp_hand::GraspHand;
+use crate::synthesize::{arrive, checked_contacts, epsilon_of};
+use crate::{FreeVolume, GraspError, GraspObject, LinkContact, Reason, free_volume};
+
+/// How to close a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CloseOptions {
+    /// Move in along the palm's z axis until something touches, before closing; else close where the hand stands.
+    pub approach: bool,
+    /// No part of the hand may lie below this height (m) in the object's frame.
+    pub support_plane: Option<f64>,
+}
+
+/// A candidate after closing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Closed {
+    /// Pose of the root link in the object's frame.
+    pub object_from_root: Isometry3<f64>,
+    /// The posture.
+    pub joints: JointPositions,
+    /// Where it touches, in order of the links.
+    pub contacts: Vec<LinkContact>,
+    /// ε; 0 without force closure.
+    pub epsilon: f64,
+    /// How much of the object stays free.
+    pub free_volume: FreeVolume,
+    /// How deep a link reaches into the object, metres: 0 but for a candidate that starts inside.
+    pub penetration: f64,
+    /// Why it is no grasp; `None` where it is one.
+    pub reason: Option<Reason>,
+}
+
+/// Closes a hand in the given pose and pre-shape, and measures what comes of it.
+///
+/// A candidate that is no grasp comes back as far as it got, with the reason. Its palm may end anywhere: positions are
+/// not measured here, so [`Reason::PalmOutsideSphere`] never occurs.
+///
+/// # Errors
+///
+/// As [`crate::synthesize`]; and [`GraspError::NotFinite`] for a pose with NaN or infinite numbers.
+pub fn close(
+    hand: &Hand,
+    object: &GraspObject,
+    object_from_root: &Isometry3<f64>,
+    preshape: &JointPositions,
+    options: &CloseOptions,
+) -> Result<Closed, GraspError> {
+    let numbers = object_from_root
+        .translation
+        .vector
+        .iter()
+        .chain(object_from_root.rotation.coords.iter());
+    if let Some(value) = numbers
+        .copied()
+        .chain(options.support_plane)
+        .find(|x| !x.is_finite())
+    {
+        return Err(GraspError::NotFinite {
+            what: "a number of the pose or the support plane",
+            value,
+        });
+    }
+    let model = GraspHand::new(hand)?;
+    let mut solver = EpsilonSolver::default();
+    let standing = standing(&model, object_from_root, preshape);
+    if self_collides(&model, preshape) {
+        return Ok(rejected(
+            &model,
+            object,
+            object_from_root,
+            standing,
+            Reason::SelfCollision,
+        ));
+    }
+    let mut pose = *object_from_root;
+    if options.approach {
+        let object_from_palm = pose * hand.root_from_palm(preshape);
+        let direction = object_from_palm.rotation * Vector3::z();
+        let (low, high) = object.surface().axis_aligned_bounds();
+        let farthest = (nalgebra::center(&low, &high) - Point3::from(object_from_palm.translation.vector))
+            .norm()
+            + (high - low).norm();
+        match arrive(&model, object, preshape, &pose, direction, farthest) {
+            Ok(arrived) if arrived.solid.is_some() => pose = arrived.object_from_root,
+            Ok(_) => {
+                return Ok(rejected(
+                    &model,
+                    object,
+                    object_from_root,
+                    standing,
+                    Reason::NoContact,
+                ));
+            }
+            Err(reason) => return Ok(rejected(&model, object, object_from_root, standing, reason)),
+        }
+    }
+    // A candidate may stand with all of a link inside the object, where no surface is near.
+    let sunk = standing_depth(&model, object, &standing) > 0.0;
+    let Some(posture) = (!sunk)
+        .then(|| close_fingers(&model, object, &pose, preshape).ok())
+        .flatten()
+    else {
+        return Ok(rejected(
+            &model,
+            object,
+            object_from_root,
+            standing,
+            Reason::StartCollision,
+        ));
+    };
+    let checked = checked_contacts(&model, object, &posture, options.support_plane);
+    let (contacts, mut reason) = match checked {
+        Ok(contacts) => (contacts, None),
+        Err(reason) => (contacts_of(&model, object, &posture.solid_poses), Some(reason)),
+    };
+    let epsilon = epsilon_of(object, &contacts, &mut solver);
+    if reason.is_none() && epsilon <= 0.0 {
+        reason = Some(Reason::NotForceClosure);
+    }
+    let palm = Point3::from((pose * hand.root_from_palm(&posture.joints)).translation.vector);
+    let points: Vec<_> = contacts.iter().map(|c| c.at.point).collect();
+    Ok(Closed {
+        object_from_root: pose,
+        penetration: standing_depth(&model, object, &posture),
+        joints: posture.joints,
+        free_volume: free_volume(&palm, &points, object.leaves()),
+        contacts,
+        epsilon,
+        reason,
+    })
+}
+
+/// The hand where it stands, open.
+fn standing(hand: &GraspHand<'_>, object_from_root: &Isometry3<f64>, preshape: &JointPositions) -> Posture {
+    let poses = hand.all_poses(preshape);
+    let solid_poses = hand
+        .solids
+        .iter()
+        .map(|s| object_from_root * poses[s.link.0] * s.link_from_solid)
+        .collect();
+    Posture {
+        joints: preshape.clone(),
+        solid_poses,
+    }
+}
+
+/// The deepest that any link reaches into the object.
+fn standing_depth(hand: &GraspHand<'_>, object: &GraspObject, posture: &Posture) -> f64 {
+    let depths = hand
+        .solids
+        .iter()
+        .zip(&posture.solid_poses)
+        .map(|(s, pose)| object.surface().depth(&s.collider, pose));
+    depths.fold(0.0, f64::max)
+}
+
+fn rejected(
+    hand: &GraspHand<'_>,
+    object: &GraspObject,
+    object_from_root: &Isometry3<f64>,
+    posture: Posture,
+    reason: Reason,
+) -> Closed {
+    Closed {
+        object_from_root: *object_from_root,
+        penetration: standing_depth(hand, object, &posture),
+        joints: posture.joints,
+        contacts: Vec::new(),
+        epsilon: 0.0,
+        free_volume: FreeVolume {
+            fvol: 1.0,
+            fvol_union: 1.0,
+        },
+        reason: Some(reason),
+    }
+}

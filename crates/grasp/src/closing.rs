@@ -1,0 +1,279 @@
+//! The fingers close: each joint until a link on it touches, distal joints going on.
+
+use nalgebra::Isometry3;
+use prehend_hand::JointPositions;
+
+use crate::GraspObject;
+use crate::first_touch::{CLEARANCE, Motion, TOUCH, Track, first_touch};
+use crate::grasp_hand::GraspHand;
+
+/// A link that touches is moved by this much (m) to see whether its gap shrinks.
+const PROBE: f64 = 5e-5;
+/// It counts as pressing where the gap shrinks by more than this share of the motion.
+const PRESSING: f64 = 0.02;
+/// No joint turns or slides farther than this while closing, whatever its limits.
+const MOST_TRAVEL: f64 = std::f64::consts::TAU;
+/// A pair that touches this often while sliding along is stopped.
+const MOST_TOUCHES: u32 = 8;
+
+/// What closing ends in.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Posture {
+    pub(crate) joints: JointPositions,
+    /// Poses of all solids, object frame.
+    pub(crate) solid_poses: Vec<Isometry3<f64>>,
+}
+
+/// Closes the hand where it stands.
+///
+/// All closing joints move together, each at its speed. When a link comes within [`TOUCH`] of the object and moving on
+/// would press it in, every free joint from the root to that link stops; joints beyond it go on. A coupled joint stops
+/// with the one that drives it. Two links of different fingers that meet stop each other in the same way: they would
+/// hold each other, and the rest of the hand can still close. Joints end at their limits. No link ever overlaps the object.
+///
+/// `Err` where a link overlaps the object, or another link, at the start: the solid's index, or `n_solids` and more for a pair.
+pub(crate) fn close_fingers(
+    hand: &GraspHand<'_>,
+    object: &GraspObject,
+    object_from_root: &Isometry3<f64>,
+    preshape: &JointPositions,
+) -> Result<Posture, usize> {
+    let n_solids = hand.solids.len();
+    let n_pairs = n_solids + hand.pairs.len();
+    let mut closing = Closing::new(hand, object, *object_from_root, preshape);
+    let mut tracks = vec![Track::apart_at(0.0); n_pairs];
+    let mut touches = vec![0u32; n_pairs];
+    loop {
+        let end = closing.end();
+        if end <= closing.s0 {
+            break;
+        }
+        let touch = first_touch(&closing, &mut tracks, end)?;
+        closing.move_to(touch.s);
+        let Some(i) = touch.pair else {
+            continue;
+        };
+        touches[i] += 1;
+        if touch.pressed || touches[i] > MOST_TOUCHES || closing.presses(i, touch.s) {
+            closing.stop(i);
+            tracks[i].grazing = false;
+        } else {
+            tracks[i].grazing = true;
+        }
+    }
+    let joints = hand.hand.joint_positions_from_slice(&closing.q0);
+    let solid_poses = (0..n_solids).map(|i| closing.pose(i, closing.s0)).collect();
+    Ok(Posture { joints, solid_poses })
+}
+
+/// Joints that move together from `q0` at `s0`.
+struct Closing<'a> {
+    hand: &'a GraspHand<'a>,
+    object: &'a GraspObject,
+    object_from_root: Isometry3<f64>,
+    s0: f64,
+    q0: Vec<f64>,
+    /// Speed of each free joint; 0 once it has stopped.
+    rates: Vec<f64>,
+    /// Speed bounds of solids against the object, then of pairs of solids.
+    speeds: Vec<f64>,
+    /// Poses of all solids at `s0`.
+    poses0: Vec<Isometry3<f64>>,
+}
+
+impl<'a> Closing<'a> {
+    fn new(
+        hand: &'a GraspHand<'a>,
+        object: &'a GraspObject,
+        object_from_root: Isometry3<f64>,
+        preshape: &JointPositions,
+    ) -> Self {
+        let rates = hand.joints().iter().map(|j| j.speed).collect();
+        let q0 = preshape.as_slice().to_vec();
+        let mut closing = Self {
+            hand,
+            object,
+            object_from_root,
+            s0: 0.0,
+            q0,
+            rates,
+            speeds: Vec::new(),
+            poses0: Vec::new(),
+        };
+        closing.settle();
+        closing
+    }
+
+    /// Stops joints at their limits, and works out bounds and poses anew.
+    fn settle(&mut self) {
+        for (joint, node) in self.hand.joints().iter().enumerate() {
+            let at_end = self.travel_left(joint) <= 1e-12;
+            if node.leader != joint || at_end {
+                self.rates[joint] = 0.0;
+            }
+        }
+        let hand = self.hand;
+        self.poses0 = (0..hand.solids.len()).map(|i| self.moved(i, self.s0)).collect();
+        self.speeds.clear();
+        self.speeds
+            .extend((0..hand.solids.len()).map(|i| hand.speed(i, &self.rates, None)));
+        self.speeds.extend(
+            hand.pairs
+                .iter()
+                .map(|&(a, b)| hand.speed(a, &self.rates, Some(b)) + hand.speed(b, &self.rates, Some(a))),
+        );
+    }
+
+    /// How much longer a joint can move.
+    fn travel_left(&self, joint: usize) -> f64 {
+        let (node, rate) = (&self.hand.joints()[joint], self.rates[joint]);
+        if rate == 0.0 {
+            return 0.0;
+        }
+        let limit = if rate > 0.0 { node.upper } else { node.lower };
+        ((limit - self.q0[joint]) / rate)
+            .max(0.0)
+            .min((MOST_TRAVEL - self.s0 * rate.abs()) / rate.abs())
+    }
+
+    /// Where the last moving joint reaches its limit.
+    fn end(&self) -> f64 {
+        self.s0
+            + (0..self.q0.len())
+                .map(|j| self.travel_left(j))
+                .fold(0.0, f64::max)
+    }
+
+    /// The value of a joint, moving or mimicking one that moves.
+    fn value(&self, joint: usize, s: f64) -> f64 {
+        let node = &self.hand.joints()[joint];
+        if node.leader != joint {
+            return node.multiplier * self.value(node.leader, s) + node.offset;
+        }
+        let rate = self.rates[joint];
+        if rate == 0.0 {
+            return self.q0[joint];
+        }
+        (self.q0[joint] + rate * (s - self.s0)).clamp(node.lower, node.upper)
+    }
+
+    fn moved(&self, solid: usize, s: f64) -> Isometry3<f64> {
+        let solid = &self.hand.solids[solid];
+        self.object_from_root
+            * self.hand.root_from_link(solid.link, |j| self.value(j, s))
+            * solid.link_from_solid
+    }
+
+    fn pose(&self, solid: usize, s: f64) -> Isometry3<f64> {
+        if s == self.s0 {
+            self.poses0[solid]
+        } else {
+            self.moved(solid, s)
+        }
+    }
+
+    fn move_to(&mut self, s: f64) {
+        self.q0 = (0..self.q0.len()).map(|j| self.value(j, s)).collect();
+        self.s0 = s;
+        self.settle();
+    }
+
+    /// Whether moving on would bring pair `i` closer.
+    fn presses(&self, i: usize, s: f64) -> bool {
+        if self.speeds[i] == 0.0 {
+            return false;
+        }
+        let now = self.gap(i, s, 1.0);
+        let later = self.gap(i, s + PROBE / self.speeds[i], 1.0);
+        later < now - PRESSING * PROBE || later <= CLEARANCE
+    }
+
+    /// Stops every joint that moves pair `i`.
+    fn stop(&mut self, i: usize) {
+        let hand = self.hand;
+        match i.checked_sub(hand.solids.len()).map(|p| hand.pairs[p]) {
+            None => {
+                for leader in hand.leaders_of(i) {
+                    self.rates[leader] = 0.0;
+                }
+            }
+            Some((a, b)) => {
+                let (of_a, of_b): (Vec<_>, Vec<_>) =
+                    (hand.leaders_of(a).collect(), hand.leaders_of(b).collect());
+                for leader in of_a
+                    .iter()
+                    .filter(|l| !of_b.contains(l))
+                    .chain(of_b.iter().filter(|l| !of_a.contains(l)))
+                {
+                    self.rates[*leader] = 0.0;
+                }
+                // A pair driven by one joint (the two jaws of a gripper) stops that joint.
+                if hand.speed(a, &self.rates, Some(b)) + hand.speed(b, &self.rates, Some(a)) > 0.0 {
+                    for leader in of_a.into_iter().chain(of_b) {
+                        self.rates[leader] = 0.0;
+                    }
+                }
+            }
+        }
+        self.settle();
+    }
+}
+
+impl Motion for Closing<'_> {
+    fn gap(&self, i: usize, s: f64, cutoff: f64) -> f64 {
+        let hand = self.hand;
+        match i.checked_sub(hand.solids.len()) {
+            None => {
+                let gap = self
+                    .object
+                    .surface()
+                    .gap(&hand.solids[i].collider, &self.pose(i, s), cutoff);
+                gap.map_or(cutoff, |g| g.distance)
+            }
+            Some(pair) => {
+                let (a, b) = hand.pairs[pair];
+                let a_from_b = self.pose(a, s).inv_mul(&self.pose(b, s));
+                let distance =
+                    hand.solids[a]
+                        .collider
+                        .distance_to(&hand.solids[b].collider, &a_from_b, cutoff);
+                distance.unwrap_or(cutoff)
+            }
+        }
+    }
+
+    fn gap_lower_bound(&self, i: usize, s: f64) -> f64 {
+        let hand = self.hand;
+        match i.checked_sub(hand.solids.len()) {
+            None => self
+                .object
+                .surface()
+                .gap_lower_bound(&hand.solids[i].collider, &self.pose(i, s)),
+            Some(pair) => {
+                let (a, b) = hand.pairs[pair];
+                let (ball_a, ball_b) = (
+                    hand.solids[a].collider.bounding_ball(),
+                    hand.solids[b].collider.bounding_ball(),
+                );
+                let between = self.pose(a, s) * ball_a.center - self.pose(b, s) * ball_b.center;
+                between.norm() - ball_a.radius - ball_b.radius
+            }
+        }
+    }
+
+    fn speed(&self, i: usize) -> f64 {
+        self.speeds[i]
+    }
+}
+
+/// Whether two links of the posture overlap that may not.
+pub(crate) fn self_collides(hand: &GraspHand<'_>, joints: &JointPositions) -> bool {
+    let poses = hand.all_poses(joints);
+    let pose = |i: usize| poses[hand.solids[i].link.0] * hand.solids[i].link_from_solid;
+    let placed: Vec<_> = (0..hand.solids.len()).map(pose).collect();
+    hand.pairs.iter().any(|&(a, b)| {
+        let (first, second) = (&hand.solids[a].collider, &hand.solids[b].collider);
+        let d = first.distance_to(second, &placed[a].inv_mul(&placed[b]), TOUCH);
+        d.is_some_and(|d| d <= CLEARANCE)
+    })
+}
