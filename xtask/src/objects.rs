@@ -5,15 +5,20 @@
 //! handle's first ring. So every surface is closed, manifold and outward by construction, and nothing has to be
 //! united or simplified afterwards; [`checks`] measures that, and the thickness of the walls, for each model.
 
+mod bottle;
 mod curve;
 mod ear;
+mod glass;
 mod hammer;
+mod knife;
 mod lathe;
 mod mass;
 mod model;
 mod mug;
+mod screwdriver;
 mod shell;
 mod sweep;
+mod vessel;
 mod write;
 
 use anyhow::{Context, Result, bail};
@@ -23,11 +28,18 @@ use std::path::Path;
 
 /// Every bundled object, type by type.
 pub fn all() -> Vec<Model> {
-    [mug::all(), hammer::all()]
-        .into_iter()
-        .flatten()
-        .map(Drawing::finish)
-        .collect()
+    [
+        bottle::all(),
+        glass::all(),
+        mug::all(),
+        knife::all(),
+        hammer::all(),
+        screwdriver::all(),
+    ]
+    .into_iter()
+    .flatten()
+    .map(Drawing::finish)
+    .collect()
 }
 
 /// Files of all objects: path below `objects/` and content.

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 
 /// All hammers.
 pub fn all() -> Vec<Drawing> {
-    vec![claw()]
+    vec![claw(), ball(), club(), mallet()]
 }
 
 /// How a hammer is put together.
@@ -37,8 +37,8 @@ struct Hammer<'a> {
 
 /// What the head ends with.
 enum Tail<'a> {
-    /// A point of a fan: a ball's pole or a second face.
-    Round,
+    /// A fan: a second face, or the pole of a ball that stands out by so much.
+    Round(f64),
     /// Two prongs, from the head's last station on: [x, z, half width, half height, half gap].
     Claw(&'a [(f64, [f64; 5])]),
 }
@@ -57,7 +57,11 @@ fn draw(hammer: &Hammer) -> Drawing {
     let face = shell.mean(first);
     shell.cap_start(first, face);
     match hammer.tail {
-        Tail::Round => shell.cap_end_flat(&rings.1[rings.1.len() - 1]),
+        Tail::Round(out) => {
+            let last = &rings.1[rings.1.len() - 1];
+            let pole = shell.mean(last) - out * Vector3::x();
+            shell.cap_end(last, pole);
+        }
         Tail::Claw(track) => claws(&mut shell, &rings.1[rings.1.len() - 1], track),
     }
     let functional = vec![PartBox::around(&shell.points, 0.2)];
@@ -251,5 +255,122 @@ fn claw() -> Drawing {
         material: "wood",
         densities: [720.0, 7800.0],
         least_thickness: 2.0,
+    })
+}
+
+/// An engineer's hammer: round face, ball behind, slim wooden handle.
+fn ball() -> Drawing {
+    draw(&Hammer {
+        name: "ball_hammer",
+        head: &[
+            (0.0, [44.0, 0.0, 11.6, 11.6, 2.0]),
+            (1.5, [42.5, 0.0, 13.4, 13.4, 2.0]),
+            (13.0, [31.0, 0.0, 13.4, 13.4, 2.0]),
+            (16.0, [28.0, 0.0, 11.2, 11.2, 2.0]),
+            (22.0, [22.0, 0.0, 9.2, 9.4, 2.1]),
+            (31.0, [13.0, 0.0, 11.6, 11.0, 4.0]),
+            (57.0, [-13.0, 0.0, 11.6, 11.0, 4.0]),
+            (63.0, [-19.0, 0.0, 8.6, 8.6, 2.2]),
+            (66.0, [-22.0, 0.0, 8.0, 8.0, 2.0]),
+            (69.0, [-25.0, 0.0, 9.6, 9.6, 2.0]),
+            (73.0, [-29.0, 0.0, 11.4, 11.4, 2.0]),
+            (77.0, [-33.0, 0.0, 12.0, 12.0, 2.0]),
+            (81.0, [-37.0, 0.0, 11.3, 11.3, 2.0]),
+            (84.5, [-40.5, 0.0, 9.4, 9.4, 2.0]),
+            (87.0, [-43.0, 0.0, 6.6, 6.6, 2.0]),
+            (88.4, [-44.4, 0.0, 3.7, 3.7, 2.0]),
+        ],
+        head_step: 4.0,
+        columns: 32,
+        eye: [33.0, 55.0],
+        eye_rows: 7,
+        margin: 1,
+        tail: Tail::Round(0.6),
+        handle: &[
+            (1.2, [0.0, 10.2, 7.0, 3.0]),
+            (20.0, [0.0, 9.4, 7.2, 2.6]),
+            (70.0, [0.0, 7.8, 6.8, 2.2]),
+            (140.0, [0.0, 10.8, 8.8, 2.2]),
+            (225.0, [0.0, 13.2, 10.4, 2.2]),
+            (250.0, [0.0, 12.8, 10.2, 2.2]),
+            (256.0, [0.0, 10.6, 8.4, 2.2]),
+            (257.5, [0.0, 7.5, 6.0, 2.2]),
+        ],
+        handle_step: 7.5,
+        grip: [115.0, 257.5],
+        material: "wood",
+        densities: [720.0, 7800.0],
+        least_thickness: 5.0,
+    })
+}
+
+/// A short heavy club hammer with two square faces.
+fn club() -> Drawing {
+    draw(&Hammer {
+        name: "club_hammer",
+        head: &[
+            (0.0, [48.0, 0.0, 17.5, 17.5, 4.0]),
+            (3.0, [45.0, 0.0, 20.5, 20.5, 4.5]),
+            (20.0, [28.0, 0.0, 21.0, 21.0, 5.0]),
+            (76.0, [-28.0, 0.0, 21.0, 21.0, 5.0]),
+            (93.0, [-45.0, 0.0, 20.5, 20.5, 4.5]),
+            (96.0, [-48.0, 0.0, 17.5, 17.5, 4.0]),
+        ],
+        head_step: 5.0,
+        columns: 40,
+        eye: [32.0, 64.0],
+        eye_rows: 8,
+        margin: 1,
+        tail: Tail::Round(0.0),
+        handle: &[
+            (1.5, [0.0, 15.4, 13.4, 3.0]),
+            (14.0, [0.0, 14.8, 12.0, 2.6]),
+            (60.0, [0.0, 14.0, 11.0, 2.3]),
+            (120.0, [0.0, 17.0, 13.6, 2.3]),
+            (185.0, [0.0, 17.4, 14.4, 2.3]),
+            (206.0, [0.0, 20.0, 16.4, 2.3]),
+            (214.0, [0.0, 19.0, 15.6, 2.3]),
+            (217.0, [0.0, 15.0, 12.0, 2.3]),
+        ],
+        handle_step: 7.0,
+        grip: [90.0, 217.0],
+        material: "plastic",
+        densities: [1450.0, 7800.0],
+        least_thickness: 15.0,
+    })
+}
+
+/// A rubber mallet: a drum on a long round handle.
+fn mallet() -> Drawing {
+    draw(&Hammer {
+        name: "rubber_mallet",
+        head: &[
+            (0.0, [58.0, 0.0, 29.0, 29.0, 2.0]),
+            (2.5, [55.5, 0.0, 32.0, 32.0, 2.0]),
+            (30.0, [28.0, 0.0, 33.5, 33.5, 2.0]),
+            (86.0, [-28.0, 0.0, 33.5, 33.5, 2.0]),
+            (113.5, [-55.5, 0.0, 32.0, 32.0, 2.0]),
+            (116.0, [-58.0, 0.0, 29.0, 29.0, 2.0]),
+        ],
+        head_step: 6.0,
+        columns: 40,
+        eye: [44.0, 72.0],
+        eye_rows: 6,
+        margin: 2,
+        tail: Tail::Round(0.0),
+        handle: &[
+            (4.5, [0.0, 13.0, 12.6, 2.3]),
+            (14.0, [0.0, 12.6, 12.6, 2.0]),
+            (150.0, [0.0, 13.4, 13.4, 2.0]),
+            (270.0, [0.0, 15.4, 15.4, 2.0]),
+            (284.0, [0.0, 14.8, 14.8, 2.0]),
+            (288.0, [0.0, 12.0, 12.0, 2.0]),
+            (289.0, [0.0, 8.5, 8.5, 2.0]),
+        ],
+        handle_step: 9.0,
+        grip: [140.0, 289.0],
+        material: "wood",
+        densities: [720.0, 1200.0],
+        least_thickness: 10.0,
     })
 }
