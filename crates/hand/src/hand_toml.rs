@@ -19,7 +19,42 @@ pub fn urdf_named_in(hand_toml: &str) -> Result<Option<String>, HandError> {
 }
 
 impl Hand {
-    /// Adds what `hand.toml` says of the hand: see `docs` of the file format in the bundled hands' files.
+    /// Adds what `hand.toml` says of the hand. All keys but `urdf`, `self_collision_exempt` and `material.links` are
+    /// needed; unknown keys are refused.
+    ///
+    /// ```toml
+    /// urdf = "gripper.urdf"                    # beside this file
+    /// opening_width = 0.08                     # m, the widest object the hand closes around, along the palm's x
+    /// contact_links = ["palm", "left", "right"]             # which links may touch the object
+    /// self_collision_exempt = [["left", "right"]]           # pairs that may overlap, beside those a joint joins
+    ///
+    /// [palm]
+    /// link = "palm"
+    /// translation = [0, 0, 0.05]               # m, in that link's frame: a point on the palm's surface
+    /// approach = [0, 0, 1]                     # out of the palm: the palm frame's z
+    /// closing = [1, 0, 0]                      # from the thumb towards the fingers: its x, made perpendicular to z
+    /// # rpy = [0, 0, 0]                        # in place of the two directions
+    ///
+    /// [material]
+    /// default = "plastic"
+    /// links = { left = "rubber", right = "rubber" }
+    ///
+    /// [[finger]]                               # one for each finger, thumb among them
+    /// name = "left"
+    /// joints = ["left_joint"]                  # movable joints, from base to tip
+    /// links = ["left"]                         # from base to tip
+    ///
+    /// [closing]                                # free joints: relative speed; the sign says which way closes
+    /// left_joint = 1
+    ///
+    /// [origin]                                 # free joints: the posture of amplitudes (0, 0); not named: 0
+    /// left_joint = 0.5
+    ///
+    /// [[eigengrasp]]                           # two: first spread (+ wider), then extension (+ more open)
+    /// name = "spread"
+    /// limits = [-1, 1]                         # amplitudes, along a direction of length 1
+    /// direction = { left_joint = 1 }           # free joints; scaled to length 1 on reading
+    /// ```
     ///
     /// # Errors
     ///

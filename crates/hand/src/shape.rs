@@ -181,3 +181,109 @@ fn mass(raw: &urdf_rs::Link) -> Result<Option<f64>, HandError> {
         expected: "a positive number of kilograms",
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Hand;
+
+    /// The collision solids of one link that holds `elements`, where every mesh file is `mesh`.
+    fn solids(elements: &str, mesh: &str) -> Vec<PlacedSolid> {
+        let urdf = format!("<robot name=\"r\"><link name=\"l\">{elements}</link></robot>");
+        let hand = Hand::from_urdf(&urdf, &|_| Ok(mesh.as_bytes().to_vec())).expect("the URDF is right");
+        hand.links()[0].collision.clone()
+    }
+
+    fn placed(xyz: &str, geometry: &str) -> String {
+        format!("<collision><origin xyz=\"{xyz}\"/><geometry>{geometry}</geometry></collision>")
+    }
+
+    #[test]
+    fn a_cylinder_between_two_balls_is_a_capsule() {
+        let cylinder = placed("0 0 1", r#"<cylinder radius="0.01" length="0.04"/>"#);
+        let ball = |z: &str| placed(&format!("0 0 {z}"), r#"<sphere radius="0.01"/>"#);
+        let capsule = Solid::Capsule {
+            half_length: 0.02,
+            radius: 0.01,
+        };
+        for elements in [
+            cylinder.clone() + &ball("0.98") + &ball("1.02"),
+            ball("0.98") + &cylinder + &ball("1.02"),
+            ball("0.98") + &ball("1.02") + &cylinder,
+        ] {
+            let solids = solids(&elements, "");
+            assert_eq!(solids.len(), 1);
+            assert_eq!(solids[0].solid, capsule);
+            assert_eq!(solids[0].link_from_solid.translation.z, 1.0);
+        }
+        let one_ball = solids(&(ball("0.5") + &cylinder + &ball("1.02")), "");
+        assert_eq!(one_ball.len(), 3, "a ball that stands elsewhere is a ball");
+        assert!(matches!(one_ball[1].solid, Solid::Cylinder { .. }));
+    }
+
+    /// A chain of three balls and two cylinders: each ball between cylinders can serve only one of them.
+    #[test]
+    fn balls_that_two_cylinders_share_are_kept_for_one() {
+        let cylinder = |z: &str| placed(&format!("0 0 {z}"), r#"<cylinder radius="0.01" length="0.04"/>"#);
+        let ball = |z: &str| placed(&format!("0 0 {z}"), r#"<sphere radius="0.01"/>"#);
+        let chain = ball("0") + &cylinder("0.02") + &ball("0.04") + &cylinder("0.06") + &ball("0.08");
+        let solids = solids(&chain, "");
+        let kinds: Vec<bool> = solids
+            .iter()
+            .map(|s| matches!(s.solid, Solid::Capsule { .. }))
+            .collect();
+        assert_eq!(kinds, [true, false, false], "capsule, cylinder, ball");
+    }
+
+    const TETRAHEDRON: &str = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+
+    #[test]
+    fn a_convex_mesh_becomes_its_hull_and_a_mirrored_one_too() {
+        for (scale, corner) in [
+            ("2 1 1", Point3::new(2.0, 0.0, 0.0)),
+            ("-2 1 1", Point3::new(-2.0, 0.0, 0.0)),
+        ] {
+            let mesh = format!("<mesh filename=\"tip.off\" scale=\"{scale}\"/>");
+            let solids = solids(&placed("0 0 0", &mesh), TETRAHEDRON);
+            let Solid::Hull(points) = &solids[0].solid else {
+                panic!("{:?}", solids[0].solid)
+            };
+            assert_eq!(points.len(), 4);
+            assert!(points.contains(&corner), "{points:?}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_with_a_dent_or_a_hole_stays_a_mesh() {
+        let open = TETRAHEDRON.replace("4 4 0", "4 3 0").replace("3 1 2 3\n", "");
+        // A fourth face pushed inwards at its middle.
+        let five = "OFF\n5 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.2 0.2 0.2\n\
+                    3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 4\n3 2 3 4\n3 3 1 4\n";
+        for text in [open.as_str(), five] {
+            let solids = solids(&placed("0 0 0", r#"<mesh filename="a.off"/>"#), text);
+            assert!(matches!(solids[0].solid, Solid::Mesh(_)), "{:?}", solids[0].solid);
+        }
+    }
+
+    #[test]
+    fn boxes_and_cylinders_are_given_by_full_lengths() {
+        let solids = solids(
+            &(placed("0 0 0", r#"<box size="2 4 6"/>"#)
+                + &placed("0 0 0", r#"<capsule radius="1" length="6"/>"#)),
+            "",
+        );
+        assert_eq!(
+            solids[0].solid,
+            Solid::Cuboid {
+                half_extents: Vector3::new(1.0, 2.0, 3.0)
+            }
+        );
+        assert_eq!(
+            solids[1].solid,
+            Solid::Capsule {
+                half_length: 3.0,
+                radius: 1.0
+            }
+        );
+    }
+}

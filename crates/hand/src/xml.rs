@@ -25,21 +25,35 @@ pub(crate) fn read(urdf: &str) -> Result<Robot, HandError> {
 
 /// Reads every `<link>` and `<joint>` alone, and names the first that fails.
 fn locate(urdf: &str) -> Option<HandError> {
-    for (what, start, end) in elements(urdf) {
-        let element = &urdf[start..end];
-        if let Err(error) = urdf_rs::read_from_string(&format!("<robot name=\"part\">{element}</robot>")) {
-            let name = element.split_once("name=").and_then(|(_, rest)| {
+    for element in elements(urdf) {
+        let text = &urdf[element.start..element.end];
+        let reason = if element.closed {
+            let alone = urdf_rs::read_from_string(&format!("<robot name=\"part\">{text}</robot>"));
+            alone
+                .err()
+                .map(|error| error.to_string().trim_start_matches("custom: ").to_owned())
+        } else {
+            Some("the element is not closed; check that the file is complete".to_owned())
+        };
+        if let Some(reason) = reason {
+            let name = text.split_once("name=").and_then(|(_, rest)| {
                 let quote = rest.chars().next().filter(|c| *c == '"' || *c == '\'')?;
                 rest[1..].split(quote).next()
             });
-            let line = urdf[..start].matches('\n').count() + 1;
-            return Some(HandError::Urdf {
-                place: format!("{what} `{}` (line {line})", name.unwrap_or("?")),
-                reason: error.to_string(),
-            });
+            let line = urdf[..element.start].matches('\n').count() + 1;
+            let place = format!("{} `{}` (line {line})", element.what, name.unwrap_or("?"));
+            return Some(HandError::Urdf { place, reason });
         }
     }
     None
+}
+
+/// A link or a joint in the text: bytes `start..end`.
+struct Element {
+    what: &'static str,
+    start: usize,
+    end: usize,
+    closed: bool,
 }
 
 /// Where tags begin, comments left out.
@@ -61,12 +75,12 @@ fn tags(urdf: &str) -> impl Iterator<Item = usize> + '_ {
     })
 }
 
-/// The outermost links and joints: what they are, where they begin and end.
-fn elements(urdf: &str) -> Vec<(&'static str, usize, usize)> {
-    let mut found: Vec<(&'static str, usize, usize)> = Vec::new();
+/// The outermost links and joints.
+fn elements(urdf: &str) -> Vec<Element> {
+    let mut found: Vec<Element> = Vec::new();
     for start in tags(urdf) {
         let rest = &urdf[start..];
-        if found.last().is_some_and(|&(_, _, end)| start < end) {
+        if found.last().is_some_and(|last| start < last.end) {
             continue;
         }
         for (what, open, close) in [("link", "<link", "</link>"), ("joint", "<joint", "</joint>")] {
@@ -76,13 +90,17 @@ fn elements(urdf: &str) -> Vec<(&'static str, usize, usize)> {
             if !named {
                 continue;
             }
-            let tag_end = rest.find('>').unwrap_or(rest.len());
-            let length = if rest[..tag_end].ends_with('/') {
-                tag_end + 1
-            } else {
-                rest.find(close).map_or(rest.len(), |end| end + close.len())
+            let end = match rest.find('>') {
+                Some(tag_end) if rest[..tag_end].ends_with('/') => Some(tag_end + 1),
+                _ => rest.find(close).map(|end| end + close.len()),
             };
-            found.push((what, start, start + length));
+            let closed = end.is_some();
+            found.push(Element {
+                what,
+                start,
+                end: start + end.unwrap_or(rest.len()),
+                closed,
+            });
         }
     }
     found

@@ -5,9 +5,9 @@ mod common;
 use std::collections::BTreeMap;
 
 use common::bundled;
-use nalgebra::{Point3, Vector3};
-use prehend_geometry::{PlacedSolid, Solid};
-use prehend_hand::{Hand, JointPositions, LinkIdx};
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_geometry::{Collider, PlacedSolid, Solid};
+use prehend_hand::{Hand, JointPositions, LinkIdx, LinkPoses};
 
 const BUNDLED: [&str; 2] = ["human", "schunk_sdh"];
 
@@ -158,6 +158,67 @@ fn the_opening_width_agrees_with_the_geometry() {
             "{name}: hand.toml says {stated} m, the geometry {widest} m"
         );
     }
+}
+
+/// The pairs that are exempt from self-collision overlap by construction; the others are free in the open hand.
+#[test]
+fn links_that_may_overlap_do_and_others_are_apart_at_zero() {
+    for name in BUNDLED {
+        let hand = bundled(name);
+        let description = hand.description().unwrap();
+        let colliders: Vec<Vec<(Collider, Isometry3<f64>)>> = hand
+            .links()
+            .iter()
+            .map(|link| {
+                let solids = link.collision.iter();
+                solids
+                    .map(|s| (Collider::new(&s.solid).unwrap(), s.link_from_solid))
+                    .collect()
+            })
+            .collect();
+        for egpc in grid(5) {
+            let poses = hand.link_poses(&hand.preshape(egpc));
+            for &(a, b) in &description.self_collision_exempt {
+                if colliders[a.0].is_empty() || colliders[b.0].is_empty() {
+                    continue;
+                }
+                let gap = link_gap(&colliders, &poses, a, b);
+                assert!(
+                    gap < 0.003,
+                    "{name}: {} and {} are {gap} m apart",
+                    hand.link(a).name,
+                    hand.link(b).name
+                );
+            }
+        }
+        let poses = hand.link_poses(&hand.positions(&BTreeMap::new()).unwrap());
+        for a in (0..hand.links().len()).map(LinkIdx) {
+            for b in (a.0 + 1..hand.links().len()).map(LinkIdx) {
+                if !description.is_exempt(a, b) {
+                    let gap = link_gap(&colliders, &poses, a, b);
+                    assert!(
+                        gap > 0.001,
+                        "{name}: {} and {} overlap",
+                        hand.link(a).name,
+                        hand.link(b).name
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Distance between two links' solids, up to a metre.
+fn link_gap(colliders: &[Vec<(Collider, Isometry3<f64>)>], poses: &LinkPoses, a: LinkIdx, b: LinkIdx) -> f64 {
+    let mut least = 1.0_f64;
+    for (solid, link_from_solid) in &colliders[a.0] {
+        for (other, link_from_other) in &colliders[b.0] {
+            let solid_from_root = (poses.root_from_link(a) * link_from_solid).inverse();
+            let placed = solid_from_root * poses.root_from_link(b) * link_from_other;
+            least = least.min(solid.distance_to(other, &placed, least).unwrap_or(least));
+        }
+    }
+    least
 }
 
 /// egpc on a regular grid over [−1, 1]².
