@@ -24,6 +24,7 @@ mod surface;
 mod tetrahedron;
 mod topology;
 mod triangle_tree;
+mod twofold;
 mod write_ply;
 
 pub use collider::{Ball, Collider};

@@ -22,9 +22,15 @@ pub(crate) struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// How far inside each corner is, in units of the normal's length.
+    /// How far inside each corner is, in units of the normal's length. What rounding could have made counts as 0, so
+    /// that faces in one plane leave no slivers behind, which further cuts would multiply.
     fn depths(&self, simplex: &Simplex) -> [f64; 4] {
-        simplex.map(|p| self.offset - self.normal.dot(&p))
+        simplex.map(|p| {
+            let terms = self.normal.component_mul(&p);
+            let depth = self.offset - terms.sum();
+            let rounding = 4.0 * f64::EPSILON * (self.offset.abs() + terms.abs().sum());
+            if depth.abs() <= rounding { 0.0 } else { depth }
+        })
     }
 }
 
