@@ -1,4 +1,40 @@
 //! Where do shapes meet, and how much do they share?
+//!
+//! Shapes come in as bytes ([`read_shape`]: OFF, OBJ, STL, PLY, and clouds as PLY, XYZ, PCD), are looked over
+//! ([`inspect`]) and mended where that needs no guess ([`repair`]), and then answer questions:
+//!
+//! - *How much is there?* [`mass_properties`], [`surface_area`], [`surface_centroid`].
+//! - *What encloses it?* [`convex_hull`], [`minimum_volume_box`]: B₀ of the paper.
+//! - *What do two bodies share?* [`Tetrahedron::intersection_volume`] with a box, and [`Tetrahedron::union_volume`] and
+//!   [`union_volume`], which count what several boxes share once: the free volume of a grasp rests on these.
+//! - *Where is the surface?* [`Surface`]: closest points, rays, inside or outside; [`Collider`] for solids against it.
+//!
+//! Lengths are metres once a file's unit has been applied ([`TriMesh::scaled`]), angles radians, numbers `f64`. The crate
+//! knows nothing of forces or robots and never opens a file. No input makes it panic: what cannot be answered is a
+//! [`GeometryError`] that says where, what was found and what was expected.
+//!
+//! # Example
+//!
+//! How much of a cube does a tetrahedron from one of its corners take?
+//!
+//! ```
+//! use prehend_geometry::{MeshFormat, Tetrahedron, mass_properties, minimum_volume_box, read_mesh, repair};
+//! # use nalgebra::Vector3;
+//!
+//! let text = "OFF 8 6\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n\
+//!     4 0 3 2 1\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n4 4 5 6 7\n";
+//! let (cube, repairs) = repair(read_mesh(text.as_bytes(), MeshFormat::Off)?);
+//! assert_eq!(repairs, Default::default());
+//! assert!((mass_properties(&cube).volume - 1.0).abs() < 1e-12);
+//!
+//! let root = minimum_volume_box(cube.vertices())?.floored(0.001);
+//! let corner = cube.vertices()[0];
+//! let enclosure = Tetrahedron([
+//!     corner, corner + Vector3::x(), corner + Vector3::y(), corner + Vector3::z(),
+//! ]);
+//! assert!((enclosure.intersection_volume(&root) - 1.0 / 6.0).abs() < 1e-9);
+//! # Ok::<(), prehend_geometry::GeometryError>(())
+//! ```
 
 mod between_solids;
 mod closest;
