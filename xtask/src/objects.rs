@@ -6,6 +6,8 @@
 //! united or simplified afterwards; [`checks`] measures that, and the thickness of the walls, for each model.
 
 mod bottle;
+#[cfg(test)]
+mod checks;
 mod curve;
 mod ear;
 mod glass;

@@ -88,7 +88,7 @@ fn martini() -> Drawing {
         Corner(4.5, 93.0, 4.0),
         Corner(0.0, 92.0, 0.0),
     ];
-    turned("martini_glass", &profile, 5.5, 48, 2.2)
+    turned("martini_glass", &profile, 5.5, 48, 1.8)
 }
 
 /// A shot glass with a thick base.

@@ -76,6 +76,7 @@ pub struct Model {
     /// What cuts.
     pub sharp: Vec<PartBox>,
     /// Thinnest place that the design has, measured along inward normals.
+    #[cfg_attr(not(test), expect(dead_code, reason = "only the tests measure it"))]
     pub least_thickness: f64,
 }
 
@@ -109,6 +110,7 @@ impl Drawing {
     /// show in the files.
     pub fn finish(self) -> Model {
         let mut shell = self.shell;
+        shell.drop_unused();
         for point in &mut shell.points {
             *point = point.map(|v| (v * 1e4).round() / 1e7 + 0.0);
         }

@@ -57,11 +57,6 @@ impl Shell {
         points.into_iter().map(|point| self.point(point)).collect()
     }
 
-    /// Joins two rings of the same length by a closed strip.
-    pub fn bridge(&mut self, from: &[usize], to: &[usize]) {
-        self.bridge_except(from, to, &(0..0));
-    }
-
     /// Joins two rings by a strip that leaves out the quadrilaterals of the columns in `skip`.
     fn bridge_except(&mut self, from: &[usize], to: &[usize], skip: &Range<usize>) {
         assert_eq!(
@@ -121,6 +116,19 @@ impl Shell {
             .map(|&idx| self.points[idx].coords)
             .sum::<nalgebra::Vector3<f64>>();
         Point3::from(sum / ring.len() as f64)
+    }
+
+    /// Drops vertices that no triangle uses: those inside holes.
+    pub fn drop_unused(&mut self) {
+        let mut kept = vec![None; self.points.len()];
+        let mut points = Vec::with_capacity(self.points.len());
+        for idx in self.triangles.iter_mut().flatten() {
+            *idx = *kept[*idx].get_or_insert_with(|| {
+                points.push(self.points[*idx]);
+                points.len() - 1
+            });
+        }
+        self.points = points;
     }
 
     /// Joins rings one after the other, leaving `holes` open for what is attached there.
