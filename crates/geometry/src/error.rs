@@ -50,4 +50,15 @@ pub enum GeometryError {
         /// Full lengths along the three axes.
         extents: [f64; 3],
     },
+
+    /// An option lies outside its range.
+    #[error("`{name}` is {value}, expected {expected}")]
+    BadOption {
+        /// Name of the option.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// The range, for example `a number above 0 and at most 1`.
+        expected: &'static str,
+    },
 }

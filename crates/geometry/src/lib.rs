@@ -4,7 +4,7 @@
 //! ([`inspect`]) and mended where that needs no guess ([`repair`]), and then answer questions:
 //!
 //! - *How much is there?* [`mass_properties`], [`surface_area`], [`surface_centroid`].
-//! - *What encloses it?* [`convex_hull`], [`minimum_volume_box`]: B₀ of the paper.
+//! - *What encloses it?* [`convex_hull`], [`minimum_volume_box`]: B₀ of the paper; [`decompose`]: the boxes B₁ … Bₙ.
 //! - *What do two bodies share?* [`Tetrahedron::intersection_volume`] with a box, and [`Tetrahedron::union_volume`] and
 //!   [`union_volume`], which count what several boxes share once: the free volume of a grasp rests on these.
 //! - *Where is the surface?* [`Surface`]: closest points, rays, inside or outside; [`Collider`] for solids against it.
@@ -37,19 +37,24 @@
 //! ```
 
 mod between_solids;
+mod box_record;
 mod closest;
 mod collider;
 mod contact_point;
+mod decompose;
 mod depth;
 mod distance_grid;
 mod enclosure;
 mod error;
 mod gap;
+mod hull;
 mod inspect;
 mod mass_properties;
 mod mesh;
+mod min_box;
 mod oriented_box;
 mod parry_bridge;
+mod planar;
 mod read;
 mod repair;
 mod shared_volume;
@@ -63,27 +68,24 @@ mod triangle_tree;
 mod twofold;
 mod write_ply;
 
+pub use box_record::BoxRecord;
 pub use collider::{Ball, Collider};
 pub use contact_point::ContactPoint;
+pub use decompose::{DecomposeOptions, Decomposition, TreeNode, decompose};
 pub use enclosure::largest_tetrahedron;
 pub use error::GeometryError;
 pub use gap::Gap;
+pub use hull::{ConvexHull, convex_hull};
 pub use inspect::{MeshReport, inspect};
 pub use mass_properties::{MassProperties, mass_properties, signed_volume, surface_area, surface_centroid};
 pub use mesh::TriMesh;
+pub use min_box::{MinimumBox, minimum_volume_box};
 pub use oriented_box::OrientedBox;
+pub use planar::planar_hull;
 pub use read::{MeshFormat, Shape, read_mesh, read_shape};
 pub use repair::{Repairs, repair};
 pub use shared_volume::union_volume;
 pub use solid::{PlacedSolid, Solid};
 pub use surface::{Hit, Surface, SurfacePoint};
 pub use tetrahedron::Tetrahedron;
-
-mod hull;
-mod planar;
-pub use hull::{ConvexHull, convex_hull};
-pub use planar::planar_hull;
-
-mod min_box;
-pub use min_box::{MinimumBox, minimum_volume_box};
 pub use write_ply::write_ply;
