@@ -23,14 +23,24 @@ pub struct BoxRecord {
 impl From<&OrientedBox> for BoxRecord {
     fn from(b: &OrientedBox) -> Self {
         let axes = std::array::from_fn(|k| b.axis(k).into());
-        Self { center: b.center().coords.into(), axes, extents: b.extents().into(), volume: b.volume() }
+        Self {
+            center: b.center().coords.into(),
+            axes,
+            extents: b.extents().into(),
+            volume: b.volume(),
+        }
     }
 }
 
 impl From<&MinimumBox> for BoxRecord {
     fn from(b: &MinimumBox) -> Self {
         let axes = std::array::from_fn(|k| Vector3::from(b.axes.matrix().column(k)).into());
-        Self { center: b.center.coords.into(), axes, extents: b.extents.into(), volume: b.volume() }
+        Self {
+            center: b.center.coords.into(),
+            axes,
+            extents: b.extents.into(),
+            volume: b.volume(),
+        }
     }
 }
 
@@ -42,7 +52,10 @@ mod tests {
     fn a_record_reads_back_as_the_box_it_came_from() {
         let original = OrientedBox::centered([1.0, 2.0, 0.5]);
         let text = serde_json::to_string(&BoxRecord::from(&original)).unwrap();
-        assert!(text.ends_with(r#""extents":[1.0,2.0,0.5],"volume":1.0}"#), "{text}");
+        assert!(
+            text.ends_with(r#""extents":[1.0,2.0,0.5],"volume":1.0}"#),
+            "{text}"
+        );
         assert_eq!(serde_json::from_str::<OrientedBox>(&text).unwrap(), original);
     }
 }

@@ -31,13 +31,25 @@ pub struct DecomposeOptions {
 
 impl Default for DecomposeOptions {
     fn default() -> Self {
-        Self { gain: 0.94, max_boxes: 32, n_cells: 48, min_slab: 0.03, min_extent: 0.005 }
+        Self {
+            gain: 0.94,
+            max_boxes: 32,
+            n_cells: 48,
+            min_slab: 0.03,
+            min_extent: 0.005,
+        }
     }
 }
 
 impl DecomposeOptions {
     fn check(&self) -> Result<(), GeometryError> {
-        let bad = |name, value, expected| Err(GeometryError::BadOption { name, value, expected });
+        let bad = |name, value, expected| {
+            Err(GeometryError::BadOption {
+                name,
+                value,
+                expected,
+            })
+        };
         if !(self.gain > 0.0 && self.gain <= 1.0) {
             return bad("gain", self.gain, "a number above 0 and at most 1");
         }
@@ -154,12 +166,22 @@ pub fn decompose(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposi
     let smallest = minimum_volume_box_near(whole.vertices(), &[])?;
     let longest = smallest.extents.max();
     if longest == 0.0 || !(longest * longest * longest).is_finite() {
-        return Err(GeometryError::BadExtents { extents: smallest.extents.into() });
+        return Err(GeometryError::BadExtents {
+            extents: smallest.extents.into(),
+        });
     }
-    let fitting = Fitting { options, min_extent: options.min_extent * longest, min_slab: options.min_slab * longest };
+    let fitting = Fitting {
+        options,
+        min_extent: options.min_extent * longest,
+        min_slab: options.min_slab * longest,
+    };
 
     let root = smallest.floored(fitting.min_extent);
-    let mut tree = vec![TreeNode { region: root, parent: None, children: None }];
+    let mut tree = vec![TreeNode {
+        region: root,
+        parent: None,
+        children: None,
+    }];
     let mut splits = vec![fitting.best_split(&whole, &root)?];
     let mut total = root.volume();
     let mut n_boxes = 1;
@@ -173,18 +195,37 @@ pub fn decompose(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposi
                 }
             }
         }
-        let Some((node, _)) = best.filter(|(_, saved)| (total - saved) / total < options.gain) else { break };
+        let Some((node, _)) = best.filter(|(_, saved)| (total - saved) / total < options.gain) else {
+            break;
+        };
         let Some(split) = splits[node].take() else { break };
         tree[node].children = Some([tree.len(), tree.len() + 1]);
         for (part, fitted) in split.parts.iter().zip(split.boxes) {
-            tree.push(TreeNode { region: fitted, parent: Some(node), children: None });
+            tree.push(TreeNode {
+                region: fitted,
+                parent: Some(node),
+                children: None,
+            });
             splits.push(fitting.best_split(part, &fitted)?);
         }
         n_boxes += 1;
-        total = tree.iter().filter(|n| n.children.is_none()).map(|n| n.region.volume()).sum();
+        total = tree
+            .iter()
+            .filter(|n| n.children.is_none())
+            .map(|n| n.region.volume())
+            .sum();
     }
-    let boxes = tree.iter().filter(|n| n.children.is_none()).map(|n| n.region).collect();
-    Ok(Decomposition { root, boxes, cvex: root.volume() / total, tree })
+    let boxes = tree
+        .iter()
+        .filter(|n| n.children.is_none())
+        .map(|n| n.region)
+        .collect();
+    Ok(Decomposition {
+        root,
+        boxes,
+        cvex: root.volume() / total,
+        tree,
+    })
 }
 
 /// The lengths that the options mean for one mesh (m).
@@ -203,7 +244,9 @@ struct Split {
 impl Fitting<'_> {
     /// The two parts at the best cut; none where no cut frees anything.
     fn best_split(&self, region: &Region, fitted: &OrientedBox) -> Result<Option<Split>, GeometryError> {
-        let Some(cut) = best_cut(region, fitted, self.options.n_cells, self.min_slab) else { return Ok(None) };
+        let Some(cut) = best_cut(region, fitted, self.options.n_cells, self.min_slab) else {
+            return Ok(None);
+        };
         let parts = region.cut(&fitted.axis(cut.axis), &fitted.center(), cut.position);
         if parts.iter().any(Region::is_empty) {
             return Ok(None);

@@ -45,7 +45,10 @@ pub(super) fn best_cut(region: &Region, fitted: &OrientedBox, n_cells: usize, mi
             let mut found = profile.most_freed(&places, image);
             let mut width = step;
             for _ in 0..2 {
-                let (low, high) = ((found.0 - width).max(slab - half), (found.0 + width).min(half - slab));
+                let (low, high) = (
+                    (found.0 - width).max(slab - half),
+                    (found.0 + width).min(half - slab),
+                );
                 let refined = profile.most_freed(&spread(low, high, N_REFINED), image);
                 if refined.1 > found.1 {
                     found = refined;
@@ -54,7 +57,11 @@ pub(super) fn best_cut(region: &Region, fitted: &OrientedBox, n_cells: usize, mi
             }
             let freed = found.1 / face;
             if freed > best.map_or(LEAST_FREED, |b| b.freed * (1.0 + 1e-9)) {
-                best = Some(Cut { axis, position: found.0, freed });
+                best = Some(Cut {
+                    axis,
+                    position: found.0,
+                    freed,
+                });
             }
         }
     }
@@ -64,7 +71,9 @@ pub(super) fn best_cut(region: &Region, fitted: &OrientedBox, n_cells: usize, mi
 /// `n + 1` numbers (at least two) from `low` to `high`.
 fn spread(low: f64, high: f64, n: usize) -> Vec<f64> {
     let n = n.max(1);
-    (0..=n).map(|i| low + (high - low) * i as f64 / n as f64).collect()
+    (0..=n)
+        .map(|i| low + (high - low) * i as f64 / n as f64)
+        .collect()
 }
 
 /// The content of a box along one of its axes, in its two images (u, v), u along the axis.
@@ -189,7 +198,9 @@ impl Chain {
             }
             chain.pop();
         }
-        let swept = chain.last().map_or(0.0, |(q, swept)| swept + q[0] * p[1] - q[1] * p[0]);
+        let swept = chain
+            .last()
+            .map_or(0.0, |(q, swept)| swept + q[0] * p[1] - q[1] * p[0]);
         chain.push((p, swept));
     }
 
@@ -206,7 +217,14 @@ mod tests {
     fn a_swept_hull_knows_its_area_after_every_point() {
         let mut hull = SweptHull::default();
         let mut areas = Vec::new();
-        for p in [[0.0, 1.0], [0.0, 0.0], [1.0, 0.5], [2.0, 2.0], [2.0, 0.0], [2.0, 1.0]] {
+        for p in [
+            [0.0, 1.0],
+            [0.0, 0.0],
+            [1.0, 0.5],
+            [2.0, 2.0],
+            [2.0, 0.0],
+            [2.0, 1.0],
+        ] {
             hull.push(p);
             areas.push(hull.area());
         }

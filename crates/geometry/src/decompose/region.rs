@@ -39,7 +39,11 @@ impl Region {
 
     /// The parts below and above the plane {p : normal · (p − origin) = position}; triangles across it are clipped.
     pub(super) fn cut(&self, normal: &Vector3<f64>, origin: &Point3<f64>, position: f64) -> [Self; 2] {
-        let mut height: Vec<f64> = self.vertices.iter().map(|p| normal.dot(&(p - origin)) - position).collect();
+        let mut height: Vec<f64> = self
+            .vertices
+            .iter()
+            .map(|p| normal.dot(&(p - origin)) - position)
+            .collect();
         let snap = ON_PLANE * height.iter().fold(0.0_f64, |most, h| most.max(h.abs()));
         for h in &mut height {
             if h.abs() <= snap {
@@ -91,7 +95,9 @@ impl Region {
             }
         }
         for last in 2..len {
-            side.region.triangles.push([polygon[0], polygon[last - 1], polygon[last]]);
+            side.region
+                .triangles
+                .push([polygon[0], polygon[last - 1], polygon[last]]);
         }
     }
 }
@@ -106,7 +112,10 @@ struct Builder {
 impl Builder {
     fn new(n_source_vertices: usize) -> Self {
         Self {
-            region: Region { vertices: Vec::new(), triangles: Vec::new() },
+            region: Region {
+                vertices: Vec::new(),
+                triangles: Vec::new(),
+            },
             kept: vec![u32::MAX; n_source_vertices],
             on_edges: BTreeMap::new(),
         }
@@ -135,8 +144,13 @@ mod tests {
     use super::*;
 
     fn area(region: &Region) -> f64 {
-        let corners = region.triangles.iter().map(|t| t.map(|v| region.vertices[v as usize]));
-        corners.map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0).sum()
+        let corners = region
+            .triangles
+            .iter()
+            .map(|t| t.map(|v| region.vertices[v as usize]));
+        corners
+            .map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0)
+            .sum()
     }
 
     #[test]
@@ -148,8 +162,18 @@ mod tests {
         for position in [0.1, 0.5, 1.0] {
             let [below, above] = whole.cut(&normal, &Point3::origin(), position);
             assert!((area(&below) + area(&above) - area(&whole)).abs() < 1e-12);
-            assert!(below.vertices.iter().all(|p| normal.dot(&p.coords) <= position + 1e-12));
-            assert!(above.vertices.iter().all(|p| normal.dot(&p.coords) >= position - 1e-12));
+            assert!(
+                below
+                    .vertices
+                    .iter()
+                    .all(|p| normal.dot(&p.coords) <= position + 1e-12)
+            );
+            assert!(
+                above
+                    .vertices
+                    .iter()
+                    .all(|p| normal.dot(&p.coords) >= position - 1e-12)
+            );
         }
     }
 
