@@ -49,7 +49,7 @@ impl MinimumBox {
 ///
 /// - the axes are matched to x, y, z by the assignment with the largest Σ |axis · e|, with axis · e ≥ 0, and are
 ///   right-handed; they are not sorted by length;
-/// - among boxes within 1e-6 of the least volume, the one that is turned least from the frame is taken;
+/// - among boxes within 5e-7 of the least volume, the one that is turned least from the frame is taken;
 /// - a box with an axis along x, y or z is preferred up to 5e-4 above the least volume, so that round bodies
 ///   (bottles, glasses) stand upright instead of following their tessellation; among those, the box along all three.
 ///

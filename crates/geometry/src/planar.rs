@@ -74,10 +74,13 @@ pub(crate) fn flush_rectangles(polygon: &[[f64; 2]], mut visit: impl FnMut([f64;
         let climb = |start: usize, d: [f64; 2]| {
             let mut at = start;
             for _ in 0..n {
-                if dot(d, polygon[next(at)]) < dot(d, polygon[at]) {
+                let (one, two) = (next(at), next(next(at)));
+                let height = dot(d, polygon[at]);
+                // Over a very short edge rounding may feign a descent; nothing does so over two.
+                if dot(d, polygon[one]) < height && dot(d, polygon[two]) < height {
                     break;
                 }
-                at = next(at);
+                at = one;
             }
             at
         };

@@ -228,6 +228,6 @@ mod tests {
             hull.push(p);
             areas.push(hull.area());
         }
-        assert_eq!(areas, [0.0, 0.0, 0.5, 1.75, 3.0, 3.0]);
+        assert_eq!(areas, [0.0, 0.0, 0.5, 1.5, 3.0, 3.0]);
     }
 }

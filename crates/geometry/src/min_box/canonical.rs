@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Boxes whose volumes differ by less than this share count as equal.
-const EQUAL: f64 = 1e-6;
+const EQUAL: f64 = 5e-7;
 
 /// A box along the frame may be larger than the smallest by this share.
 ///

@@ -15,11 +15,13 @@ const N_FACETS: usize = 64;
 /// Boxes that are measured again about their own axes.
 const N_STARTS: usize = 6;
 /// Of those, boxes whose axes are polished.
-const N_POLISHED: usize = 3;
+const N_POLISHED: usize = 4;
 /// Hulls with more corners are scanned in a simplified form.
 const LARGE_HULL: usize = 100;
 /// How far inside the hull its simplified form may lie, relative to half of each extent of a first box.
 const SIMPLIFIED: f64 = 4e-3;
+/// Rounds of measuring a box about its own axes; each is cheap, and more than a few only creep.
+const MAX_ROUNDS: usize = 12;
 /// A box counts as smaller where it is smaller by this share.
 const IMPROVEMENT: f64 = 1e-10;
 
@@ -91,20 +93,26 @@ pub(super) fn solid(hull: &UnitHull, hints: &[Vector3<f64>]) -> Vec<Candidate> {
     directions.extend(facets);
     directions.extend(lattice(N_LATTICE));
 
-    let mut starts = match first.filter(|_| hull.points.len() > LARGE_HULL) {
-        Some(first) => scan(&mut simplified(hull, &first.axes), &directions),
-        None => scan(&mut full, &directions),
-    };
+    // The coarse part of the search sees a large hull in simplified form.
+    let simple = first
+        .filter(|_| hull.points.len() > LARGE_HULL)
+        .map(|first| simplified(hull, &first.axes));
+    let is_simplified = simple.is_some();
+    let mut rough = simple.unwrap_or_else(|| full.clone());
+    let mut starts = scan(&mut rough, &directions);
     for start in &mut starts {
-        *start = settle(&mut full, start.axes);
+        *start = settle(&mut rough, start.axes);
     }
     starts.sort_by(by_size);
     starts.truncate(N_POLISHED);
     for start in &mut starts {
-        *start = polish(&mut full, *start, &[0.03], 60);
+        *start = polish(&mut rough, *start, &[0.03], 50);
+        if is_simplified {
+            *start = settle(&mut full, start.axes);
+        }
     }
     starts.sort_by(by_size);
-    let best = polish(&mut full, starts[0], &[0.01, 1e-3, 3e-5], 80);
+    let best = polish(&mut full, starts[0], &[3e-3, 1e-5], 80);
 
     let mut candidates = vec![Candidate {
         axes: Matrix3::identity(),
@@ -148,7 +156,7 @@ fn settle(body: &mut Silhouette, axes: Matrix3<f64>) -> Candidate {
         axes,
         size: f64::INFINITY,
     };
-    loop {
+    for _ in 0..MAX_ROUNDS {
         let size_before = best.size;
         let axes = best.axes;
         for k in 0..3 {
@@ -158,9 +166,10 @@ fn settle(body: &mut Silhouette, axes: Matrix3<f64>) -> Candidate {
             }
         }
         if best.size >= size_before * (1.0 - IMPROVEMENT) || !best.size.is_finite() {
-            return best;
+            break;
         }
     }
+    best
 }
 
 /// Turns each axis of a box a little, by Nelder and Mead's method at each scale (rad), keeping what shrinks it.

@@ -8,7 +8,11 @@ use crate::planar::{flush_rectangles, planar_hull_into};
 /// Up to this many corners all of them are projected; beyond, only those on the outline are.
 const SMALL_HULL: usize = 40;
 
+/// Corners of an outline closer than this (bodies have a size near 1) are one.
+const SAME_CORNER: f64 = 1e-12;
+
 /// A convex body ready to be measured along many directions.
+#[derive(Clone)]
 pub(super) struct Silhouette {
     points: Vec<Vector3<f64>>,
     /// Outward normals of the facets, any length.
@@ -18,7 +22,7 @@ pub(super) struct Silhouette {
     scratch: Scratch,
 }
 
-#[derive(Default)]
+#[derive(Default, Clone)]
 struct Scratch {
     facing: Vec<bool>,
     seen_in: Vec<u32>,
@@ -56,6 +60,8 @@ impl Silhouette {
 
     /// Visits every box with one axis along the unit vector `axis` that is flush with an edge of the outline.
     pub(super) fn boxes_about(&mut self, axis: &Vector3<f64>, mut visit: impl FnMut(Candidate)) {
+        // Axes are handed on from box to box: without this their rounding would grow.
+        let axis = &axis.normalize();
         let (u, v) = perpendicular(axis);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for p in &self.points {
@@ -137,9 +143,14 @@ impl Silhouette {
         scratch.order.extend(0..scratch.flat.len() as u32);
         planar_hull_into(&scratch.flat, &mut scratch.order, &mut scratch.corners);
         scratch.polygon.clear();
-        scratch
-            .polygon
-            .extend(scratch.corners.iter().map(|&i| scratch.flat[i as usize]));
+        for &i in &scratch.corners {
+            let p = scratch.flat[i as usize];
+            let is_new = |q: &[f64; 2]| (p[0] - q[0]).abs().max((p[1] - q[1]).abs()) > SAME_CORNER;
+            // Corners behind one another make edges whose directions are only rounding.
+            if scratch.polygon.last().is_none_or(is_new) && scratch.polygon.first().is_none_or(is_new) {
+                scratch.polygon.push(p);
+            }
+        }
         if scratch.polygon.len() < 3 {
             scratch.polygon.clear();
         }
@@ -149,5 +160,5 @@ impl Silhouette {
 /// Two unit vectors that complete `axis` to a right-handed frame.
 pub(super) fn perpendicular(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
-    (u, axis.cross(&u))
+    (u, axis.cross(&u).normalize())
 }
