@@ -109,3 +109,57 @@ fn middle(mesh: &TriMesh) -> Point3<f64> {
     let (low, high) = mesh.axis_aligned_bounds();
     low + (high - low) / 2.0
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::repair::tests::cube;
+
+    /// A block of edges a, b, c has the inertia m (b² + c²) / 12 about its x axis.
+    #[test]
+    fn a_block_has_the_figures_of_the_textbook() {
+        let scale = Vector3::new(2.0, 3.0, 4.0);
+        let vertices = cube(1.0)
+            .vertices()
+            .iter()
+            .map(|p| p.coords.component_mul(&scale).into())
+            .collect();
+        let block = TriMesh::new(vertices, cube(1.0).triangles().to_vec()).unwrap();
+        let away = Isometry3::translation(1000.0, -1000.0, 500.0);
+        for (mesh, center) in [
+            (block.clone(), Point3::origin()),
+            (block.transformed(&away), away * Point3::origin()),
+        ] {
+            let mass = mass_properties(&mesh);
+            assert!((mass.volume - 24.0).abs() < 1e-9);
+            assert!((mass.center_of_mass - center).norm() < 1e-9);
+            let expected = Matrix3::from_diagonal(&Vector3::new(50.0, 40.0, 26.0));
+            assert!((mass.inertia - expected).norm() < 1e-9, "{}", mass.inertia);
+            assert!((surface_area(&mesh) - 52.0).abs() < 1e-9);
+            assert!((surface_centroid(&mesh) - center).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn inside_out_is_negative_volume_with_the_same_inertia() {
+        let triangles = cube(2.0).triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
+        let inverted = TriMesh::new(cube(2.0).vertices().to_vec(), triangles).unwrap();
+        let (inverted, upright) = (mass_properties(&inverted), mass_properties(&cube(2.0)));
+        assert!((inverted.volume + 8.0).abs() < 1e-14);
+        assert!((inverted.inertia - upright.inertia).norm() < 1e-13);
+    }
+
+    #[test]
+    fn a_sheet_has_its_surface_centroid_and_no_inertia() {
+        let corners = [[0.0, 0.0, 5.0], [3.0, 0.0, 5.0], [0.0, 3.0, 5.0]]
+            .map(Point3::from)
+            .to_vec();
+        let mass = mass_properties(&TriMesh::new(corners, vec![[0, 1, 2]]).unwrap());
+        assert_eq!((mass.volume, mass.inertia), (0.0, Matrix3::zeros()));
+        assert!((mass.center_of_mass - Point3::new(1.0, 1.0, 5.0)).norm() < 1e-15);
+        let point = TriMesh::new(vec![Point3::new(1.0, 2.0, 3.0); 3], vec![[0, 1, 2]]).unwrap();
+        assert_eq!(mass_properties(&point).center_of_mass, Point3::new(1.0, 2.0, 3.0));
+    }
+}

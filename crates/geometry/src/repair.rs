@@ -15,6 +15,9 @@ const FULLNESS: f64 = 1e-3;
 /// How many points of a part are asked whether it lies inside another.
 const WITNESSES: usize = 15;
 
+/// How many bodies, the largest first, may hold other parts: keeps files of a million loose pieces in linear time.
+const MOST_BODIES: usize = 256;
+
 /// What [`repair`] did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Repairs {
@@ -141,14 +144,18 @@ fn turn_outward(vertices: &[Point3<f64>], triangles: &mut [[u32; 3]]) -> usize {
         .zip(rims)
         .map(|(members, rim)| Part::new(members, &rim, vertices, triangles))
         .collect();
+    let mut bodies: Vec<&Part> = parts.iter().filter(|part| part.is_body()).collect();
+    bodies.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
+    bodies.truncate(MOST_BODIES);
+    if !parts.iter().any(Part::is_inside_out) {
+        return 0;
+    }
     let mut n_inverted = 0;
     for part in &parts {
-        let around = parts
+        let mut larger = bodies
             .iter()
-            .filter(|other| other.volume.abs() > part.volume.abs() && other.holds(part));
-        let outermost = around
-            .max_by(|a, b| a.volume.abs().total_cmp(&b.volume.abs()))
-            .unwrap_or(part);
+            .take_while(|body| body.volume.abs() > part.volume.abs());
+        let outermost = larger.find(|body| body.holds(part)).map_or(part, |body| *body);
         if outermost.is_inside_out() {
             for &triangle in &part.members {
                 triangles[triangle].swap(1, 2);
@@ -205,8 +212,12 @@ impl Part {
         }
     }
 
+    fn is_body(&self) -> bool {
+        self.volume.abs() > FULLNESS * self.area.powf(1.5)
+    }
+
     fn is_inside_out(&self) -> bool {
-        self.volume < -FULLNESS * self.area.powf(1.5)
+        self.is_body() && self.volume < 0.0
     }
 
     /// Whether a part lies inside this one, judged by the middles of some of its triangles.
@@ -372,6 +383,18 @@ pub(crate) mod tests {
         assert_eq!((repairs.inverted, repairs.flipped_triangles), (1, 0));
         assert_eq!(inspect(&repaired).non_manifold_edges, 1);
         assert!((signed_volume(&repaired) - 2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn thousands_of_loose_parts_take_no_time() {
+        let cube = turned(&cube(1.0));
+        let at = |i: i32| {
+            nalgebra::Isometry3::translation(f64::from(i % 100) * 2.0, f64::from(i / 100) * 2.0, 0.0)
+        };
+        let many: Vec<_> = (0..5000).map(|i| cube.transformed(&at(i))).collect();
+        let (repaired, repairs) = repair(joined(&many));
+        assert_eq!((repairs.inverted, repairs.flipped_triangles), (5000, 0));
+        assert!((signed_volume(&repaired) - 5000.0).abs() < 1e-7);
     }
 
     #[test]

@@ -207,3 +207,50 @@ fn overlapping(this: &OrientedBox, others: &[OrientedBox]) -> Vec<OrientedBox> {
     near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     near
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+
+    use super::*;
+
+    fn cube_at(x: f64, y: f64, z: f64) -> OrientedBox {
+        OrientedBox::new(Point3::new(x, y, z), Rotation3::identity(), Vector3::repeat(1.0)).unwrap()
+    }
+
+    /// Legs of length a on a unit cube's corner: a³/6 less (a − 1)³/6 beyond each of three faces, up to a = 2; 1 from 3 on.
+    #[test]
+    fn a_corner_tetrahedron_leaves_the_cube_as_it_grows() {
+        let cube = cube_at(0.5, 0.5, 0.5);
+        for (leg, expected) in [(1.0, 1.0 / 6.0), (1.5, 0.5), (2.0, 5.0 / 6.0), (3.0, 1.0)] {
+            let corner = Point3::origin();
+            let t = Tetrahedron([
+                corner,
+                corner + Vector3::x() * leg,
+                corner + Vector3::y() * leg,
+                corner + Vector3::z() * leg,
+            ]);
+            assert!(
+                (t.intersection_volume(&cube) - expected).abs() < 1e-15,
+                "leg {leg}"
+            );
+        }
+    }
+
+    #[test]
+    fn shared_corners_and_copies_count_once() {
+        // Two unit cubes half a unit apart along every axis share an eighth.
+        let cubes = [cube_at(0.0, 0.0, 0.0), cube_at(0.5, 0.5, 0.5)];
+        assert!((union_volume(&cubes) - 1.875).abs() < 1e-14);
+        assert!((union_volume(&[cubes[0], cubes[0], cubes[0]]) - 1.0).abs() < 1e-14);
+        assert_eq!(union_volume(&[cubes[0], cube_at(5.0, 0.0, 0.0)]), 2.0);
+        assert_eq!(union_volume(&[]), 0.0);
+    }
+
+    #[test]
+    fn flat_tetrahedra_share_nothing() {
+        let flat = Tetrahedron([[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.]].map(Point3::from));
+        assert_eq!(flat.intersection_volume(&cube_at(0.0, 0.0, 0.0)), 0.0);
+        assert_eq!(flat.union_volume(&[cube_at(0.0, 0.0, 0.0)]), 0.0);
+    }
+}
