@@ -338,7 +338,11 @@ fn vessels_are_open_down_to_the_floor() {
         let above = Point3::new(0.3e-3, 0.2e-3, opening.z + 0.01);
         let mut down = tree.crossings(&above, &-Vector3::z());
         down.sort_by(f64::total_cmp);
-        assert!(down.len() >= 2 && down.len().is_multiple_of(2), "{}: {down:?}", model.name);
+        assert!(
+            down.len() >= 2 && down.len().is_multiple_of(2),
+            "{}: {down:?}",
+            model.name
+        );
         let depth = down[0] - 0.01;
         assert!(depth > 0.35 * height, "{}: {depth} m deep", model.name);
         for k in 0..12 {
