@@ -1,5 +1,7 @@
 //! Triangles in a tree of bounds: the nearest one to a point, a solid or another tree.
 
+use std::cell::Cell;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use parry3d_f64::partitioning::{Bvh, BvhNode, TraversalAction};
 
@@ -72,12 +74,28 @@ impl TriangleTree {
         below: f64,
     ) -> Option<Nearest> {
         let placed = PlacedBounds::new(collider, tree_from_core);
+        // GJK is dear: a triangle beyond a plane that stands `best` off the core needs none.
+        let last_plane: Cell<Option<Plane>> = Cell::new(None);
+        let is_convex = matches!(collider.core, Core::Convex(_));
         let found = self.bvh.find_best(
             below,
             |node, _| placed.distance(node),
             |i, best| {
-                let pair = core_to_triangle(collider, tree_from_core, &self.triangles[i as usize], best)?;
-                Some(((pair.0 - pair.1).norm(), pair))
+                let triangle = &self.triangles[i as usize];
+                if is_convex {
+                    let beyond = last_plane
+                        .get()
+                        .is_some_and(|plane| plane.distance(triangle) >= best);
+                    if beyond || placed.distance_to_plane_of(triangle) >= best {
+                        return None;
+                    }
+                }
+                let pair = core_to_triangle(collider, tree_from_core, triangle, best)?;
+                let distance = (pair.0 - pair.1).norm();
+                if is_convex && distance < best {
+                    last_plane.set(Plane::at(&pair.0, &(pair.1 - pair.0)));
+                }
+                Some((distance, pair))
             },
         );
         found.map(|(triangle, (distance, (on_core, on_tree)))| Nearest {
@@ -180,6 +198,30 @@ fn by_features(
     })
 }
 
+/// A plane that touches a convex core in its closest point to some triangle, its normal away from the core.
+#[derive(Clone, Copy)]
+struct Plane {
+    normal: Vector3<f64>,
+    height: f64,
+}
+
+impl Plane {
+    /// By the theorem of separating planes the core lies below it; a hair is added for rounding.
+    fn at(on_core: &Point3<f64>, towards_triangle: &Vector3<f64>) -> Option<Self> {
+        let normal = towards_triangle.try_normalize(1e-6)?;
+        Some(Self {
+            normal,
+            height: normal.dot(&on_core.coords) + 1e-9,
+        })
+    }
+
+    /// A lower bound of a triangle's distance from the core; may be negative.
+    fn distance(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
+        let height = |p: &Point3<f64>| self.normal.dot(&p.coords);
+        height(a).min(height(b)).min(height(c)) - self.height
+    }
+}
+
 /// A core's bounds seen from a tree, and a tree's nodes seen from the core.
 struct PlacedBounds {
     rotation: Matrix3<f64>,
@@ -215,6 +257,15 @@ impl PlacedBounds {
             .sup(&Vector3::zeros())
             .norm_squared();
         in_tree.max(in_core).sqrt()
+    }
+
+    /// A lower bound of the distance between the core and the plane of a triangle; 0 for one without area.
+    fn distance_to_plane_of(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE) else {
+            return 0.0;
+        };
+        let reach = self.rotation.tr_mul(&normal).abs().dot(&self.half);
+        normal.dot(&(self.center - a.coords)).abs() - reach
     }
 }
 
