@@ -1,10 +1,26 @@
 //! The hand comes in along its palm's z axis until something touches.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
+use prehend_geometry::{Collider, Surface};
 
 use crate::GraspObject;
-use crate::first_touch::{Motion, Track, first_touch};
+use crate::first_touch::{Motion, NEAR, Track, first_touch};
 use crate::grasp_hand::GraspHand;
+
+/// Near the object, solids move this far between two looks, metres.
+pub(crate) const LEAST_STEP: f64 = 5e-4;
+/// An exact gap is looked for up to this distance, metres; beyond it, one step this long is as good.
+const REACH: f64 = 5e-3;
+
+/// The gap of a solid, or a lower bound of it above [`NEAR`].
+pub(crate) fn look(surface: &Surface, solid: &Collider, pose: &Isometry3<f64>) -> f64 {
+    let bound = surface.gap_lower_bound(solid, pose);
+    if bound > NEAR {
+        return bound;
+    }
+    let cutoff = bound.max(0.0) + REACH;
+    surface.gap(solid, pose, cutoff).map_or(cutoff, |g| g.distance)
+}
 
 /// Slides an open hand along a straight line.
 pub(crate) struct Approach<'a> {
@@ -50,13 +66,19 @@ impl Motion for Approach<'_> {
         gap.map_or(cutoff, |g| g.distance)
     }
 
-    fn gap_lower_bound(&self, i: usize, s: f64) -> f64 {
-        self.object
-            .surface()
-            .gap_lower_bound(&self.hand.solids[i].collider, &self.pose(i, s))
+    fn look(&self, i: usize, s: f64) -> f64 {
+        look(
+            self.object.surface(),
+            &self.hand.solids[i].collider,
+            &self.pose(i, s),
+        )
     }
 
     fn speed(&self, _: usize) -> f64 {
         1.0
+    }
+
+    fn least_step(&self, _: usize) -> f64 {
+        LEAST_STEP
     }
 }

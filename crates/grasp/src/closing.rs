@@ -4,7 +4,8 @@ use nalgebra::Isometry3;
 use prehend_hand::JointPositions;
 
 use crate::GraspObject;
-use crate::first_touch::{CLEARANCE, Motion, TOUCH, Track, first_touch};
+use crate::approach::{self, LEAST_STEP};
+use crate::first_touch::{CLEARANCE, Motion, NEAR, TOUCH, Track, first_touch};
 use crate::grasp_hand::GraspHand;
 
 /// A link that touches is moved by this much (m) to see whether its gap shrinks.
@@ -13,6 +14,10 @@ const PROBE: f64 = 5e-5;
 const PRESSING: f64 = 0.02;
 /// No joint turns or slides farther than this while closing, whatever its limits.
 const MOST_TRAVEL: f64 = std::f64::consts::TAU;
+/// Links may come this much (m) closer to each other between two looks: fingers are thicker.
+const LEAST_STEP_OF_PAIRS: f64 = 2e-3;
+/// Distances between links are looked for up to this, metres.
+const FAR: f64 = 0.05;
 /// A pair that touches this often while sliding along is stopped.
 const MOST_TOUCHES: u32 = 8;
 
@@ -115,13 +120,12 @@ impl<'a> Closing<'a> {
         let hand = self.hand;
         self.poses0 = (0..hand.solids.len()).map(|i| self.moved(i, self.s0)).collect();
         self.speeds.clear();
+        let rates = &self.rates;
+        let speed = |shares: &Vec<(usize, f64)>| -> f64 {
+            shares.iter().map(|(l, share)| rates[*l].abs() * share).sum()
+        };
         self.speeds
-            .extend((0..hand.solids.len()).map(|i| hand.speed(i, &self.rates, None)));
-        self.speeds.extend(
-            hand.pairs
-                .iter()
-                .map(|&(a, b)| hand.speed(a, &self.rates, Some(b)) + hand.speed(b, &self.rates, Some(a))),
-        );
+            .extend(hand.solid_shares.iter().chain(&hand.pair_shares).map(speed));
     }
 
     /// How much longer a joint can move.
@@ -188,32 +192,16 @@ impl<'a> Closing<'a> {
         later < now - PRESSING * PROBE || later <= CLEARANCE
     }
 
-    /// Stops every joint that moves pair `i`.
+    /// Stops every joint that changes gap `i`: those to a link, or those that move one of two links and not the other.
     fn stop(&mut self, i: usize) {
-        let hand = self.hand;
-        match i.checked_sub(hand.solids.len()).map(|p| hand.pairs[p]) {
-            None => {
-                for leader in hand.leaders_of(i) {
-                    self.rates[leader] = 0.0;
-                }
-            }
-            Some((a, b)) => {
-                let (of_a, of_b): (Vec<_>, Vec<_>) =
-                    (hand.leaders_of(a).collect(), hand.leaders_of(b).collect());
-                for leader in of_a
-                    .iter()
-                    .filter(|l| !of_b.contains(l))
-                    .chain(of_b.iter().filter(|l| !of_a.contains(l)))
-                {
-                    self.rates[*leader] = 0.0;
-                }
-                // A pair driven by one joint (the two jaws of a gripper) stops that joint.
-                if hand.speed(a, &self.rates, Some(b)) + hand.speed(b, &self.rates, Some(a)) > 0.0 {
-                    for leader in of_a.into_iter().chain(of_b) {
-                        self.rates[leader] = 0.0;
-                    }
-                }
-            }
+        let n_solids = self.hand.solids.len();
+        let shares = if i < n_solids {
+            &self.hand.solid_shares[i]
+        } else {
+            &self.hand.pair_shares[i - n_solids]
+        };
+        for (leader, _) in shares {
+            self.rates[*leader] = 0.0;
         }
         self.settle();
     }
@@ -242,27 +230,35 @@ impl Motion for Closing<'_> {
         }
     }
 
-    fn gap_lower_bound(&self, i: usize, s: f64) -> f64 {
+    fn look(&self, i: usize, s: f64) -> f64 {
         let hand = self.hand;
-        match i.checked_sub(hand.solids.len()) {
-            None => self
-                .object
-                .surface()
-                .gap_lower_bound(&hand.solids[i].collider, &self.pose(i, s)),
-            Some(pair) => {
-                let (a, b) = hand.pairs[pair];
-                let (ball_a, ball_b) = (
-                    hand.solids[a].collider.bounding_ball(),
-                    hand.solids[b].collider.bounding_ball(),
-                );
-                let between = self.pose(a, s) * ball_a.center - self.pose(b, s) * ball_b.center;
-                between.norm() - ball_a.radius - ball_b.radius
-            }
+        let Some(pair) = i.checked_sub(hand.solids.len()) else {
+            return approach::look(self.object.surface(), &hand.solids[i].collider, &self.pose(i, s));
+        };
+        let (a, b) = hand.pairs[pair];
+        let (first, second) = (&hand.solids[a].collider, &hand.solids[b].collider);
+        let (ball_a, ball_b) = (first.bounding_ball(), second.bounding_ball());
+        let (pose_a, pose_b) = (self.pose(a, s), self.pose(b, s));
+        let between = pose_a * ball_a.center - pose_b * ball_b.center;
+        let bound = between.norm() - ball_a.radius - ball_b.radius;
+        if bound > NEAR {
+            return bound;
         }
+        first
+            .distance_to(second, &pose_a.inv_mul(&pose_b), FAR)
+            .unwrap_or(FAR)
     }
 
     fn speed(&self, i: usize) -> f64 {
         self.speeds[i]
+    }
+
+    fn least_step(&self, i: usize) -> f64 {
+        if i < self.hand.solids.len() {
+            LEAST_STEP
+        } else {
+            LEAST_STEP_OF_PAIRS
+        }
     }
 }
 

@@ -42,7 +42,7 @@ pub enum GraspError {
         /// The link.
         link: String,
         /// What is wrong with the shape.
-        source: prehend_geometry::GeometryError,
+        source: Box<prehend_geometry::GeometryError>,
     },
 
     /// The object has no boxes.
@@ -65,6 +65,15 @@ pub enum GraspError {
         what: &'static str,
         /// What was found.
         value: f64,
+    },
+
+    /// There is nothing to try.
+    #[error(
+        "there is no try {try_idx}: no face of the object fits the hand's opening; try a hand that opens wider"
+    )]
+    NoSuchTry {
+        /// The number asked for.
+        try_idx: usize,
     },
 
     /// The progress callback asked to stop.

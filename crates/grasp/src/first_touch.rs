@@ -4,17 +4,20 @@
 pub(crate) const TOUCH: f64 = 1e-4;
 /// A smaller gap counts as an overlap, so that rounding in a distance cannot hide one; metres.
 pub(crate) const CLEARANCE: f64 = 1e-6;
-/// Where the gap is small, bodies move this far between two looks, metres. No link is thin enough to be hopped over.
-const LEAST_STEP: f64 = 2.5e-4;
+/// A gap larger than this need not be known exactly to choose the next step, metres.
+pub(crate) const NEAR: f64 = 2.5e-3;
 
 /// Gaps between pairs of bodies that move with one parameter s.
 pub(crate) trait Motion {
     /// The gap of pair `i` at `s`, metres: 0 or less where the two overlap, `cutoff` where it is that or more.
     fn gap(&self, i: usize, s: f64, cutoff: f64) -> f64;
-    /// A cheap lower bound of the gap; may be negative.
-    fn gap_lower_bound(&self, i: usize, s: f64) -> f64;
+    /// The same, or any lower bound of it above [`NEAR`].
+    fn look(&self, i: usize, s: f64) -> f64;
     /// A bound of how fast the gap of pair `i` can change, metres per unit of s; 0 where it does not move.
     fn speed(&self, i: usize) -> f64;
+    /// Where the gap is small, the pair moves this far between two looks, metres: less than the bodies are thick, so
+    /// that none can be hopped over.
+    fn least_step(&self, i: usize) -> f64;
 }
 
 /// What is known of one pair.
@@ -56,7 +59,7 @@ pub(crate) struct Touch {
 /// The least s up to `end` at which a pair's gap is in ([`CLEARANCE`], [`TOUCH`]]; pairs that graze must want to overlap.
 ///
 /// Conservative advancement: each pair is looked at again only when it could have used up its last known gap. Near the
-/// object, where such steps would get ever smaller, pairs move at least [`LEAST_STEP`] and an overlap is bisected.
+/// object, where such steps would get ever smaller, pairs move at least their least step and an overlap is bisected.
 ///
 /// `Err` names a pair that overlaps at the start.
 pub(crate) fn first_touch(motion: &impl Motion, tracks: &mut [Track], end: f64) -> Result<Touch, usize> {
@@ -65,11 +68,12 @@ pub(crate) fn first_touch(motion: &impl Motion, tracks: &mut [Track], end: f64) 
         pair: None,
         pressed: false,
     };
+    let moving: Vec<usize> = (0..tracks.len()).filter(|i| motion.speed(*i) > 0.0).collect();
     loop {
         let mut next: Option<(f64, usize)> = None;
-        for (i, track) in tracks.iter().enumerate() {
-            let open = track.due < touch.s || (!track.sure && track.free < touch.s);
-            if open && motion.speed(i) > 0.0 {
+        for &i in &moving {
+            let track = &tracks[i];
+            if track.due < touch.s || (!track.sure && track.free < touch.s) {
                 let at = track.due.min(touch.s);
                 if next.is_none_or(|(s, _)| at < s) {
                     next = Some((at, i));
@@ -81,12 +85,7 @@ pub(crate) fn first_touch(motion: &impl Motion, tracks: &mut [Track], end: f64) 
         };
         let track = &mut tracks[i];
         let speed = motion.speed(i);
-        let bound = motion.gap_lower_bound(i, s);
-        let gap = if bound > 10.0 * LEAST_STEP {
-            bound
-        } else {
-            motion.gap(i, s, bound.max(0.0) + 0.02)
-        };
+        let gap = motion.look(i, s);
         if gap <= CLEARANCE {
             if track.free >= s {
                 return Err(i);
@@ -118,10 +117,10 @@ pub(crate) fn first_touch(motion: &impl Motion, tracks: &mut [Track], end: f64) 
             };
         } else {
             track.grazing &= gap <= TOUCH;
-            let sure_step = gap - TOUCH / 2.0;
+            let (sure_step, least_step) = (gap - TOUCH / 2.0, motion.least_step(i));
             track.free = s;
-            track.sure = sure_step >= LEAST_STEP;
-            track.due = s + sure_step.max(LEAST_STEP) / speed;
+            track.sure = sure_step >= least_step;
+            track.due = s + sure_step.max(least_step) / speed;
         }
     }
 }
@@ -161,8 +160,12 @@ mod tests {
         fn gap(&self, i: usize, s: f64, cutoff: f64) -> f64 {
             (self.from[i] - s * self.speeds[i]).min(cutoff)
         }
-        fn gap_lower_bound(&self, i: usize, s: f64) -> f64 {
-            self.gap(i, s, 1.0) * 0.9 - 0.002
+        fn look(&self, i: usize, s: f64) -> f64 {
+            let gap = self.gap(i, s, 1.0);
+            if gap * 0.9 > NEAR { gap * 0.9 } else { gap }
+        }
+        fn least_step(&self, _: usize) -> f64 {
+            5e-4
         }
         fn speed(&self, i: usize) -> f64 {
             self.speeds[i] * 1.7

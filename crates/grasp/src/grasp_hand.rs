@@ -14,8 +14,10 @@ pub(crate) struct GraspHand<'a> {
     pub(crate) solids: Vec<LinkSolid>,
     links: Vec<LinkNode>,
     joints: Vec<JointNode>,
-    /// For each solid and each joint on the way to it: a bound of how far the solid's points move per unit of the joint.
-    reach: Vec<Vec<(usize, f64)>>,
+    /// For each solid: the free joints that move it, and how far its points move at most per unit of each.
+    pub(crate) solid_shares: Vec<Vec<(usize, f64)>>,
+    /// For each of `pairs`: the free joints that move one solid against the other, likewise.
+    pub(crate) pair_shares: Vec<Vec<(usize, f64)>>,
     /// Pairs of solids that may collide with each other.
     pub(crate) pairs: Vec<(usize, usize)>,
     /// Size of the palm along its y axis, metres.
@@ -74,7 +76,7 @@ impl<'a> GraspHand<'a> {
                 let collider = Collider::new(&placed.solid).map_err(|source| GraspError::Shape {
                     hand: name(),
                     link: link.name.clone(),
-                    source,
+                    source: Box::new(source),
                 })?;
                 solids.push(LinkSolid {
                     link: LinkIdx(idx),
@@ -93,17 +95,25 @@ impl<'a> GraspHand<'a> {
             solids,
             links,
             joints,
-            reach: Vec::new(),
+            solid_shares: Vec::new(),
+            pair_shares: Vec::new(),
             pairs: Vec::new(),
             palm_width: 0.0,
         };
-        model.reach = (0..model.solids.len())
+        let reaches: Vec<_> = (0..model.solids.len())
             .map(|i| model.reach_of(i, description))
             .collect();
+        model.solid_shares = reaches.iter().map(|r| model.by_leader(r.iter())).collect();
         for i in 0..model.solids.len() {
             for j in i + 1..model.solids.len() {
                 if !description.is_exempt(model.solids[i].link, model.solids[j].link) {
                     model.pairs.push((i, j));
+                    // Joints below both move them as one.
+                    let is_of = |solid: usize, joint: usize| reaches[solid].iter().any(|(k, _)| *k == joint);
+                    let of_first = reaches[i].iter().filter(|(joint, _)| !is_of(j, *joint));
+                    let of_second = reaches[j].iter().filter(|(joint, _)| !is_of(i, *joint));
+                    let shares = model.by_leader(of_first.chain(of_second));
+                    model.pair_shares.push(shares);
                 }
             }
         }
@@ -151,24 +161,18 @@ impl<'a> GraspHand<'a> {
         &self.joints
     }
 
-    /// The free joints that move a solid's link, each once, base first.
-    pub(crate) fn leaders_of(&self, solid: usize) -> impl Iterator<Item = usize> + '_ {
-        self.reach[solid]
-            .iter()
-            .map(|(joint, _)| self.joints[*joint].leader)
-    }
-
-    /// A bound of a solid's speed where each free joint `l` moves at `rates[l]`; joints that move `without` too do not count.
-    pub(crate) fn speed(&self, solid: usize, rates: &[f64], without: Option<usize>) -> f64 {
-        let shared =
-            |joint: usize| without.is_some_and(|other| self.reach[other].iter().any(|(j, _)| *j == joint));
-        self.reach[solid]
-            .iter()
-            .filter(|(joint, _)| !shared(*joint))
-            .map(|(joint, reach)| {
-                (rates[self.joints[*joint].leader] * self.joints[*joint].multiplier).abs() * reach
-            })
-            .sum()
+    /// Reaches of joints, added up per free joint that drives them.
+    fn by_leader<'b>(&self, reaches: impl Iterator<Item = &'b (usize, f64)>) -> Vec<(usize, f64)> {
+        let mut shares: Vec<(usize, f64)> = Vec::new();
+        for (joint, reach) in reaches {
+            let node = &self.joints[*joint];
+            let share = node.multiplier.abs() * reach;
+            match shares.iter_mut().find(|(leader, _)| *leader == node.leader) {
+                Some((_, sum)) => *sum += share,
+                None => shares.push((node.leader, share)),
+            }
+        }
+        shares
     }
 
     /// Friction and torsion of a solid's contact with an object.

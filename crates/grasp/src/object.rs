@@ -1,7 +1,7 @@
 //! An object made ready for grasping.
 
 use nalgebra::Point3;
-use prehend_geometry::{OrientedBox, Surface, TriMesh, surface_centroid, union_volume};
+use prehend_geometry::{Decomposition, OrientedBox, Surface, TriMesh, surface_centroid, union_volume};
 use prehend_quality::{Material, QualityOptions};
 
 use crate::{GraspError, object_size};
@@ -38,6 +38,42 @@ impl Region {
 }
 
 impl GraspObject {
+    /// An object from its mesh and decomposition; both in the object's frame, metres.
+    ///
+    /// Torques are taken about `wrench_center` (the centre of mass); without one, about the centroid of the surface.
+    ///
+    /// # Errors
+    ///
+    /// As [`GraspObject::from_boxes`].
+    pub fn new(
+        mesh: TriMesh,
+        decomposition: &Decomposition,
+        wrench_center: Option<Point3<f64>>,
+        material: Material,
+    ) -> Result<Self, GraspError> {
+        let tree = &decomposition.tree;
+        let leaf_nodes: Vec<usize> = decomposition.leaves().collect();
+        let mut inner = Vec::new();
+        for (idx, node) in tree.iter().enumerate() {
+            if node.children.is_some() {
+                let is_below =
+                    |leaf: usize| std::iter::successors(Some(leaf), |n| tree[*n].parent).any(|n| n == idx);
+                let own = (0..leaf_nodes.len())
+                    .filter(|i| is_below(leaf_nodes[*i]))
+                    .collect();
+                inner.push((node.region, own));
+            }
+        }
+        Self::from_boxes(
+            mesh,
+            decomposition.root,
+            decomposition.boxes.clone(),
+            &inner,
+            wrench_center,
+            material,
+        )
+    }
+
     /// An object from its mesh and boxes; all in the object's frame, metres.
     ///
     /// `leaves` are the boxes of the decomposition, `inner` the boxes around several of them (the root and other nodes

@@ -70,18 +70,7 @@ pub fn synthesize(
     options: &SynthesisOptions,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<Synthesis, GraspError> {
-    if let Some(value) = options.support_plane.filter(|z| !z.is_finite()) {
-        return Err(GraspError::NotFinite {
-            what: "the support plane's height",
-            value,
-        });
-    }
-    let model = GraspHand::new(hand)?;
-    let tries = Tries::new(
-        hypotheses(object, model.description().opening_width, model.palm_width),
-        options.seed,
-        &options.stream,
-    );
+    let (model, tries) = prepared(hand, object, options)?;
     let n_tries = if tries.n_hypotheses() == 0 {
         0
     } else {
@@ -122,6 +111,47 @@ pub fn synthesize(
         tried: n_tries,
         n_hypotheses: tries.n_hypotheses(),
     })
+}
+
+/// Makes one try again: the grasp of a row, from its try's number and the options that the table was made with.
+///
+/// # Errors
+///
+/// As [`synthesize`]; and [`GraspError::NoSuchTry`] where the object has no hypotheses.
+pub fn retry(
+    hand: &Hand,
+    object: &GraspObject,
+    options: &SynthesisOptions,
+    try_idx: usize,
+) -> Result<Result<Grasp, Reason>, GraspError> {
+    let (model, tries) = prepared(hand, object, options)?;
+    let attempt = tries
+        .get(try_idx, object)
+        .ok_or(GraspError::NoSuchTry { try_idx })?;
+    Ok(run_try(
+        &model,
+        object,
+        &attempt,
+        options.support_plane,
+        &mut EpsilonSolver::default(),
+    ))
+}
+
+fn prepared<'a>(
+    hand: &'a Hand,
+    object: &GraspObject,
+    options: &SynthesisOptions,
+) -> Result<(GraspHand<'a>, Tries), GraspError> {
+    if let Some(value) = options.support_plane.filter(|z| !z.is_finite()) {
+        return Err(GraspError::NotFinite {
+            what: "the support plane's height",
+            value,
+        });
+    }
+    let model = GraspHand::new(hand)?;
+    let found = hypotheses(object, model.description().opening_width, model.palm_width);
+    let tries = Tries::new(found, options.seed, &options.stream);
+    Ok((model, tries))
 }
 
 /// Makes one try.
