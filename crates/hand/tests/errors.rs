@@ -31,14 +31,11 @@ fn urdf_with(old: &str, new: &str) -> String {
 /// A tetrahedron in ASCII STL.
 fn tip_stl() -> Vec<u8> {
     let corners = ["0 0 0", "0.01 0 0", "0 0.01 0", "0 0 0.01"];
-    let mut stl = String::from("solid tip\n");
-    for [a, b, c] in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
+    let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|[a, b, c]: [usize; 3]| {
         let (a, b, c) = (corners[a], corners[b], corners[c]);
-        stl += &format!(
-            "facet normal 0 0 0\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n"
-        );
-    }
-    (stl + "endsolid tip\n").into_bytes()
+        format!("facet normal 0 0 0\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n")
+    });
+    format!("solid tip\n{}endsolid tip\n", faces.concat()).into_bytes()
 }
 
 fn read(urdf: &str) -> Result<Hand, HandError> {
