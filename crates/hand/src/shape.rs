@@ -1,7 +1,13 @@
 //! The solids of a link, from its `<collision>` and `<visual>` elements.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_geometry::{PlacedSolid, Solid};
+use prehend_geometry::{
+    GeometryError, MeshFormat, PlacedSolid, Solid, TriMesh, convex_hull, inspect, read_mesh, repair,
+    signed_volume,
+};
 use urdf_rs::Geometry;
 
 use crate::urdf::pose;
@@ -12,6 +18,8 @@ pub type Resolve<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 pub(crate) struct ShapeReader<'a> {
     resolve: &'a Resolve<'a>,
+    /// What has been read: hands use the same file for several links.
+    meshes: BTreeMap<(String, [u64; 3], Use), Solid>,
     warnings: Vec<String>,
 }
 
@@ -19,6 +27,7 @@ impl<'a> ShapeReader<'a> {
     pub fn new(resolve: &'a Resolve<'a>) -> Self {
         Self {
             resolve,
+            meshes: BTreeMap::new(),
             warnings: Vec::new(),
         }
     }
@@ -32,13 +41,13 @@ impl<'a> ShapeReader<'a> {
         let mut collision = Vec::with_capacity(raw.collision.len());
         for element in &raw.collision {
             let link_from_solid = pose(&element.origin, place)?;
-            collision.push(self.read_solid(&raw.name, &element.geometry, link_from_solid)?);
+            collision.push(self.read_solid(&raw.name, &element.geometry, link_from_solid, Use::Collision)?);
         }
         let collision = merge_capsules(collision);
         let mut visual = Vec::with_capacity(raw.visual.len());
         for element in &raw.visual {
             let link_from_solid = pose(&element.origin, place)?;
-            match self.read_solid(&raw.name, &element.geometry, link_from_solid) {
+            match self.read_solid(&raw.name, &element.geometry, link_from_solid, Use::Visual) {
                 Ok(solid) => visual.push(solid),
                 Err(error @ (HandError::MeshMissing { .. } | HandError::MeshUnreadable { .. })) => {
                     self.warnings.push(format!("not drawn: {error}"));
@@ -59,6 +68,7 @@ impl<'a> ShapeReader<'a> {
         link: &str,
         geometry: &Geometry,
         link_from_solid: Isometry3<f64>,
+        purpose: Use,
     ) -> Result<PlacedSolid, HandError> {
         let size = |what, numbers: &[f64]| positive(link, what, numbers);
         let solid = match geometry {
@@ -89,7 +99,18 @@ impl<'a> ShapeReader<'a> {
             }
             Geometry::Mesh { filename, scale } => {
                 let scale = scale.map_or(Vector3::repeat(1.0), |s| Vector3::from(s.0));
-                self.read_mesh(link, filename, &scale)?
+                let key = (filename.clone(), scale.map(f64::to_bits).into(), purpose);
+                if let Some(solid) = self.meshes.get(&key) {
+                    solid.clone()
+                } else {
+                    let mesh = self.read_mesh(link, filename, &scale)?;
+                    let solid = match purpose {
+                        Use::Collision => collision_solid(mesh),
+                        Use::Visual => Solid::Mesh(Arc::new(mesh)),
+                    };
+                    self.meshes.insert(key, solid.clone());
+                    solid
+                }
             }
         };
         Ok(PlacedSolid {
@@ -98,7 +119,7 @@ impl<'a> ShapeReader<'a> {
         })
     }
 
-    fn read_mesh(&mut self, link: &str, file: &str, scale: &Vector3<f64>) -> Result<Solid, HandError> {
+    fn read_mesh(&mut self, link: &str, file: &str, scale: &Vector3<f64>) -> Result<TriMesh, HandError> {
         if scale.iter().any(|s| !s.is_finite() || *s == 0.0) {
             return Err(HandError::Value {
                 place: format!("link `{link}`, mesh `{file}`"),
@@ -107,17 +128,71 @@ impl<'a> ShapeReader<'a> {
                 expected: "three finite numbers, none of them 0",
             });
         }
-        let _bytes = (self.resolve)(file).map_err(|reason| HandError::MeshMissing {
+        let unreadable = |reason: String| HandError::MeshUnreadable {
+            link: link.to_owned(),
+            file: file.to_owned(),
+            reason,
+        };
+        let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+        let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
+        let Some(format) = MeshFormat::from_extension(extension) else {
+            let found =
+                format!("`.{extension}` is not a format that is read; convert it to STL, OBJ, PLY or OFF");
+            return Err(unreadable(found));
+        };
+        let bytes = (self.resolve)(file).map_err(|reason| HandError::MeshMissing {
             link: link.to_owned(),
             file: file.to_owned(),
             reason,
         })?;
-        Err(HandError::MeshUnreadable {
-            link: link.to_owned(),
-            file: file.to_owned(),
-            reason: "mesh files are not read yet; use boxes, capsules, cylinders and spheres".into(),
-        })
+        let mesh = read_mesh(&bytes, format).map_err(|error| unreadable(error.to_string()))?;
+        scaled(&mesh, scale).map_err(|error| unreadable(error.to_string()))
     }
+}
+
+/// What a solid is read for.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Use {
+    Collision,
+    Visual,
+}
+
+/// Share of its convex hull's volume that a mesh may leave out and still count as that hull: dents of a thousandth
+/// are finer than the collision meshes that come with hands.
+const HULL_DEFICIT: f64 = 1e-3;
+
+/// A mesh as a solid that collides: its convex hull where it fills that, else its surface.
+fn collision_solid(mesh: TriMesh) -> Solid {
+    let (mesh, _) = repair(mesh);
+    if inspect(&mesh).watertight
+        && let Ok(hull) = convex_hull(mesh.vertices())
+        && signed_volume(&mesh) >= (1.0 - HULL_DEFICIT) * hull.volume()
+        && hull.volume() > 0.0
+    {
+        let corners: BTreeSet<u32> = hull.triangles().iter().flatten().copied().collect();
+        let points = corners
+            .iter()
+            .map(|&corner| hull.points()[corner as usize])
+            .collect();
+        return Solid::Hull(Arc::new(points));
+    }
+    Solid::Mesh(Arc::new(mesh))
+}
+
+/// The mesh scaled along each axis; mirrored, it is wound the other way round, so that it still looks outwards.
+fn scaled(mesh: &TriMesh, scale: &Vector3<f64>) -> Result<TriMesh, GeometryError> {
+    let vertices = mesh
+        .vertices()
+        .iter()
+        .map(|p| p.coords.component_mul(scale).into())
+        .collect();
+    let mut triangles = mesh.triangles().to_vec();
+    if scale.product() < 0.0 {
+        for triangle in &mut triangles {
+            triangle.swap(1, 2);
+        }
+    }
+    TriMesh::new(vertices, triangles)
 }
 
 /// Turns every cylinder with a ball of its radius about each end into a capsule: plain URDF has no word for one.

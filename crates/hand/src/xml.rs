@@ -9,118 +9,144 @@ const MAX_DEPTH: usize = 64;
 
 /// Parses the text. Where that fails, finds the first element that cannot be read and names it.
 pub(crate) fn read(urdf: &str) -> Result<Robot, HandError> {
-    check_nesting(urdf)?;
+    let tags = tags(urdf)?;
+    check_nesting(&tags)?;
     match urdf_rs::read_from_string(urdf) {
-        Ok(robot) if urdf.contains("<robot") => Ok(robot),
+        Ok(robot) if tags.iter().any(|tag| tag.is("<robot")) => Ok(robot),
         Ok(_) => Err(HandError::Urdf {
             place: "document".into(),
             reason: "the outermost element is not <robot>; expected a URDF".into(),
         }),
-        Err(error) => Err(locate(urdf).unwrap_or_else(|| HandError::Urdf {
+        Err(error) => Err(locate(urdf, &tags).unwrap_or_else(|| HandError::Urdf {
             place: "document".into(),
             reason: format!("{error}; check that the file is complete and well-formed XML"),
         })),
     }
 }
 
-/// Reads every `<link>` and `<joint>` alone, and names the first that fails.
-fn locate(urdf: &str) -> Option<HandError> {
-    for element in elements(urdf) {
-        let text = &urdf[element.start..element.end];
-        let reason = if element.closed {
-            let alone = urdf_rs::read_from_string(&format!("<robot name=\"part\">{text}</robot>"));
-            alone
-                .err()
-                .map(|error| error.to_string().trim_start_matches("custom: ").to_owned())
+/// A tag, from `<` to `>`, and where it stands.
+struct Tag<'a> {
+    text: &'a str,
+    start: usize,
+    line: usize,
+}
+
+impl Tag<'_> {
+    fn end(&self) -> usize {
+        self.start + self.text.len()
+    }
+
+    /// Whether the tag begins so and its name ends there.
+    fn is(&self, open: &str) -> bool {
+        let rest = self.text.strip_prefix(open);
+        rest.is_some_and(|rest| rest.starts_with([' ', '\t', '\r', '\n', '>', '/']))
+    }
+
+    fn closes_itself(&self) -> bool {
+        self.text.ends_with("/>")
+    }
+}
+
+/// All tags outside comments. Quoted text inside a tag may hold `<` and `>`.
+fn tags(urdf: &str) -> Result<Vec<Tag<'_>>, HandError> {
+    let mut found = Vec::new();
+    let (mut at, mut line) = (0, 1);
+    while let Some(offset) = urdf[at..].find('<') {
+        let start = at + offset;
+        line += urdf[at..start].matches('\n').count();
+        let rest = &urdf[start..];
+        let comment = rest.starts_with("<!--");
+        let length = if comment {
+            rest.find("-->").map(|end| end + 3)
         } else {
-            Some("the element is not closed; check that the file is complete".to_owned())
+            tag_length(rest)
         };
-        if let Some(reason) = reason {
-            let name = text.split_once("name=").and_then(|(_, rest)| {
-                let quote = rest.chars().next().filter(|c| *c == '"' || *c == '\'')?;
-                rest[1..].split(quote).next()
+        let Some(length) = length else {
+            let what = if comment { "a comment" } else { "a tag" };
+            return Err(HandError::Urdf {
+                place: format!("line {line}"),
+                reason: format!("{what} is not closed; check that the file is complete"),
             });
-            let line = urdf[..element.start].matches('\n').count() + 1;
-            let place = format!("{} `{}` (line {line})", element.what, name.unwrap_or("?"));
-            return Some(HandError::Urdf { place, reason });
+        };
+        if !comment {
+            found.push(Tag {
+                text: &rest[..length],
+                start,
+                line,
+            });
+        }
+        line += rest[..length].matches('\n').count();
+        at = start + length;
+    }
+    Ok(found)
+}
+
+/// Length up to and with the first `>` that is not quoted.
+fn tag_length(rest: &str) -> Option<usize> {
+    let mut quote = None;
+    for (idx, byte) in rest.bytes().enumerate() {
+        match (quote, byte) {
+            (None, b'>') => return Some(idx + 1),
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), _) if open == byte => quote = None,
+            _ => {}
         }
     }
     None
 }
 
-/// A link or a joint in the text: bytes `start..end`.
-struct Element {
-    what: &'static str,
-    start: usize,
-    end: usize,
-    closed: bool,
-}
-
-/// Where tags begin, comments left out.
-fn tags(urdf: &str) -> impl Iterator<Item = usize> + '_ {
-    let mut at = 0;
-    std::iter::from_fn(move || {
-        loop {
-            let start = at + urdf[at..].find('<')?;
-            let comment = urdf[start..].starts_with("<!--");
-            at = if comment {
-                start + urdf[start..].find("-->")?
-            } else {
-                start + 1
-            };
-            if !comment {
-                return Some(start);
-            }
-        }
-    })
-}
-
-/// The outermost links and joints.
-fn elements(urdf: &str) -> Vec<Element> {
-    let mut found: Vec<Element> = Vec::new();
-    for start in tags(urdf) {
-        let rest = &urdf[start..];
-        if found.last().is_some_and(|last| start < last.end) {
+/// Reads every `<link>` and `<joint>` alone, and names the first that fails.
+fn locate(urdf: &str, tags: &[Tag<'_>]) -> Option<HandError> {
+    let mut done = 0;
+    for tag in tags.iter().filter(|tag| tag.is("<link") || tag.is("<joint")) {
+        if tag.start < done {
             continue;
         }
-        for (what, open, close) in [("link", "<link", "</link>"), ("joint", "<joint", "</joint>")] {
-            let named = rest
-                .strip_prefix(open)
-                .is_some_and(|r| r.starts_with([' ', '\t', '\r', '\n', '>', '/']));
-            if !named {
-                continue;
+        let (what, close) = if tag.is("<link") {
+            ("link", "</link>")
+        } else {
+            ("joint", "</joint>")
+        };
+        let end = if tag.closes_itself() {
+            Some(tag.end())
+        } else {
+            urdf[tag.start..]
+                .find(close)
+                .map(|end| tag.start + end + close.len())
+        };
+        let reason = match end {
+            Some(end) => {
+                let alone = format!("<robot name=\"part\">{}</robot>", &urdf[tag.start..end]);
+                let error = urdf_rs::read_from_string(&alone).err();
+                error.map(|error| error.to_string().trim_start_matches("custom: ").to_owned())
             }
-            let end = match rest.find('>') {
-                Some(tag_end) if rest[..tag_end].ends_with('/') => Some(tag_end + 1),
-                _ => rest.find(close).map(|end| end + close.len()),
-            };
-            let closed = end.is_some();
-            found.push(Element {
-                what,
-                start,
-                end: start + end.unwrap_or(rest.len()),
-                closed,
+            None => Some("the element is not closed; check that the file is complete".to_owned()),
+        };
+        if let Some(reason) = reason {
+            let name = tag.text.split_once("name=").and_then(|(_, rest)| {
+                let quote = rest.chars().next().filter(|c| *c == '"' || *c == '\'')?;
+                rest[1..].split(quote).next()
             });
+            let place = format!("{what} `{}` (line {})", name.unwrap_or("?"), tag.line);
+            return Some(HandError::Urdf { place, reason });
         }
+        done = end.unwrap_or(urdf.len());
     }
-    found
+    None
 }
 
 /// Refuses text that nests deeper than [`MAX_DEPTH`].
-fn check_nesting(urdf: &str) -> Result<(), HandError> {
+fn check_nesting(tags: &[Tag<'_>]) -> Result<(), HandError> {
     let mut depth = 0_usize;
-    for start in tags(urdf) {
-        let rest = &urdf[start..];
-        if rest.starts_with("</") {
+    for tag in tags {
+        if tag.text.starts_with("</") {
             depth = depth.saturating_sub(1);
-        } else if !rest.starts_with("<!") && !rest.starts_with("<?") {
-            let tag = rest.split('>').next().unwrap_or(rest);
-            depth += usize::from(!tag.ends_with('/'));
+        } else if !tag.closes_itself() && !tag.text.starts_with("<!") && !tag.text.starts_with("<?") {
+            depth += 1;
         }
         if depth > MAX_DEPTH {
-            let line = urdf[..start].matches('\n').count() + 1;
             return Err(HandError::Urdf {
-                place: format!("line {line}"),
+                place: format!("line {}", tag.line),
                 reason: format!("elements nest deeper than {MAX_DEPTH}; expected a URDF"),
             });
         }

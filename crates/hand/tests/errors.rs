@@ -62,7 +62,7 @@ const KNUCKLE_LIMIT: &str = r#"<limit lower="-0.5" upper="1.5" effort="1" veloci
 
 #[test]
 fn text_that_is_no_urdf_is_refused() {
-    for text in ["", "no xml at all", "<robot", "{\"json\": true}"] {
+    for text in ["", "no xml at all", "{\"json\": true}"] {
         let message = read(text).expect_err(text).to_string();
         assert!(message.starts_with("URDF, document: "), "{text:?}: {message}");
     }
@@ -76,7 +76,15 @@ fn text_that_is_no_urdf_is_refused() {
     );
     assert_says(
         "<robot name=\"x\">\n<link name=\"a\"",
+        "URDF, line 2: a tag is not closed; check that the file is complete",
+    );
+    assert_says(
+        "<robot name=\"x\">\n<link name=\"a\">",
         "URDF, link `a` (line 2): the element is not closed; check that the file is complete",
+    );
+    assert_says(
+        "<robot name=\"x\">\n<!-- a > b",
+        "URDF, line 2: a comment is not closed; check that the file is complete",
     );
     let deep = format!("<robot>{}", "<a>".repeat(100_000));
     assert_says(
