@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::min_box::minimum_volume_box_near;
 use crate::{BoxRecord, GeometryError, OrientedBox, TriMesh};
-use cut::best_cut;
+use cut::{Cut, promising_cuts};
 use region::Region;
 
 /// When to split a box, and how finely to look.
@@ -123,18 +123,21 @@ fn with_volumes<S: Serializer>(boxes: &[OrientedBox], serializer: S) -> Result<S
 /// shrinks; so the result does not depend on the order in which boxes are visited. The tree has at most
 /// 1 + ln(cvex) / ln(1/gain) leaves.
 ///
-/// The cut of a box is the one that frees the most area in one of the images of its content on its faces:
+/// Cuts of a box are scored by the area that they free in one of the images of its content on its faces:
 ///
 /// ```text
 /// α = 1 − (H − H₁ − H₂) / A,    H, H₁, H₂: area of the convex hull of the image, and of its two parts; A: of the face
 /// ```
 ///
-/// All images and both of their axes are tried at [`DecomposeOptions::n_cells`] places, and the best of each place
-/// is refined. H₁ and H₂ are computed from the triangles clipped at the cut: the limit of ever denser samples of the
-/// surface, without their noise, so there is no seed. Samples of the inside would add nothing: where a closed body
-/// is cut, the hull of each part of its surface contains the part of its inside, because the rim of the cut face
-/// belongs to both. The same holds for the boxes, which are fitted to the clipped triangles: together they cover the
-/// surface exactly and, where it is closed, the inside. The cavity of a vessel counts as object by the same token.
+/// All images and both of their axes are tried at [`DecomposeOptions::n_cells`] places, and the best one of
+/// each is refined. Boxes are fitted at these (at most six) cuts, and the split that leaves the least volume
+/// is meant: where the smallest box lies askew, as it does about a mug, the cut with the least α alone is a
+/// matter of luck. H₁ and H₂ are computed from the triangles clipped at the cut: the limit of ever denser
+/// samples of the surface, without their noise, so there is no seed. Samples of the inside would add nothing:
+/// where a closed body is cut, the hull of each part of its surface contains the part of its inside, because
+/// the rim of the cut face belongs to both. The same holds for the boxes, which are fitted to the clipped
+/// triangles: together they cover the surface exactly and, where it is closed, the inside. The cavity of a
+/// vessel counts as object by the same token.
 /// Meshes may have holes, loose parts and either winding.
 ///
 /// # Errors
@@ -242,11 +245,29 @@ struct Split {
 }
 
 impl Fitting<'_> {
-    /// The two parts at the best cut; none where no cut frees anything.
+    /// The split that leaves the least volume, of those at promising cuts; none where no cut frees anything.
     fn best_split(&self, region: &Region, fitted: &OrientedBox) -> Result<Option<Split>, GeometryError> {
-        let Some(cut) = best_cut(region, fitted, self.options.n_cells, self.min_slab) else {
-            return Ok(None);
-        };
+        let mut best: Option<(Split, f64)> = None;
+        for cut in promising_cuts(region, fitted, self.options.n_cells, self.min_slab) {
+            if let Some(split) = self.split_at(region, fitted, &cut)? {
+                let volume = split.boxes[0].volume() + split.boxes[1].volume();
+                if best
+                    .as_ref()
+                    .is_none_or(|(_, least)| volume < least * (1.0 - 1e-6))
+                {
+                    best = Some((split, volume));
+                }
+            }
+        }
+        Ok(best.map(|(split, _)| split))
+    }
+
+    fn split_at(
+        &self,
+        region: &Region,
+        fitted: &OrientedBox,
+        cut: &Cut,
+    ) -> Result<Option<Split>, GeometryError> {
         let parts = region.cut(&fitted.axis(cut.axis), &fitted.center(), cut.position);
         if parts.iter().any(Region::is_empty) {
             return Ok(None);

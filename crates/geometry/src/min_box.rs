@@ -43,7 +43,7 @@ impl MinimumBox {
 /// The convex hull is measured by rotating calipers about some 200 directions: a Fibonacci lattice, the normals of
 /// large hull facets and the frame's axes. For a given axis the calipers are exact. The best few are measured again
 /// about each of their own axes until nothing improves, and their axes are polished by Nelder and Mead's method.
-/// On random points this finds the best known volume to about one part in a million.
+/// On random points this finds the least volume known to 5e-7 in 99 of 100 runs, and to 5e-4 in the rest.
 ///
 /// Which of several equally small boxes is meant depends on the frame of the points:
 ///

@@ -23,21 +23,26 @@ pub(super) struct Cut {
     freed: f64,
 }
 
-/// The cut with the least α over all images, axes and places; none where no cut sees a dent.
+/// The promising cuts: of each image along each of its axes the one with the least α, where it sees a dent.
 ///
-/// No cut takes off a slab thinner than `min_slab`. The first of equal cuts counts, in the order of axes, images
-/// and places.
-pub(super) fn best_cut(region: &Region, fitted: &OrientedBox, n_cells: usize, min_slab: f64) -> Option<Cut> {
+/// In the order of axes and images, the first of equal places; those that free less than half as much as the best
+/// are left out. No cut takes off a slab thinner than `min_slab`.
+pub(super) fn promising_cuts(
+    region: &Region,
+    fitted: &OrientedBox,
+    n_cells: usize,
+    min_slab: f64,
+) -> Vec<Cut> {
     let local: Vec<Vector3<f64>> = region.vertices().iter().map(|p| fitted.local(p)).collect();
     let extents = fitted.extents();
-    let mut best: Option<Cut> = None;
+    let mut cuts: Vec<Cut> = Vec::new();
     for axis in 0..3 {
         let half = extents[axis] / 2.0;
         let slab = min_slab.max(extents[axis] / n_cells as f64);
         if half <= slab {
             continue;
         }
-        let mut profile = Profile::new(&local, region.triangles(), axis);
+        let profile = Profile::new(&local, region.triangles(), axis);
         let places = spread(slab - half, half - slab, n_cells - 2);
         let step = (places[1] - places[0]).abs();
         for (image, side) in [(axis + 1) % 3, (axis + 2) % 3].into_iter().enumerate() {
@@ -55,17 +60,21 @@ pub(super) fn best_cut(region: &Region, fitted: &OrientedBox, n_cells: usize, mi
                 }
                 width *= 2.0 / N_REFINED as f64;
             }
-            let freed = found.1 / face;
-            if freed > best.map_or(LEAST_FREED, |b| b.freed * (1.0 + 1e-9)) {
-                best = Some(Cut {
-                    axis,
-                    position: found.0,
-                    freed,
-                });
+            let cut = Cut {
+                axis,
+                position: found.0,
+                freed: found.1 / face,
+            };
+            // Two images often see the same cut.
+            let is_seen = |c: &Cut| c.axis == axis && (c.position - cut.position).abs() < 0.1 * step;
+            if cut.freed > LEAST_FREED && !cuts.iter().any(is_seen) {
+                cuts.push(cut);
             }
         }
     }
-    best
+    let most = cuts.iter().map(|c| c.freed).fold(0.0, f64::max);
+    cuts.retain(|c| c.freed >= most / 2.0);
+    cuts
 }
 
 /// `n + 1` numbers (at least two) from `low` to `high`.
@@ -100,7 +109,7 @@ impl Profile {
     }
 
     /// The place where a cut frees the most area in an image (0 or 1), and that area; the first of equals.
-    fn most_freed(&mut self, places: &[f64], image: usize) -> (f64, f64) {
+    fn most_freed(&self, places: &[f64], image: usize) -> (f64, f64) {
         let spans = self.spans_at(places, image);
         let below = self.hull_areas(places, &spans, image, false);
         let above = self.hull_areas(places, &spans, image, true);
