@@ -3,7 +3,7 @@
 //! A drawing is woven from rings of vertices ([`shell`]): vessels are turned on a [`lathe`], tools are sections carried
 //! along a path ([`sweep`]), and where a handle meets a body the body leaves a [`shell::Hole`] whose edge is the
 //! handle's first ring. So every surface is closed, manifold and outward by construction, and nothing has to be
-//! united or simplified afterwards; [`checks`] measures that, and the thickness of the walls, for each model.
+//! united or simplified afterwards; `checks.rs` measures that, and the thickness of the walls, for each model.
 
 mod bottle;
 #[cfg(test)]
