@@ -59,7 +59,17 @@ pub fn observe(
     let closing = object_from_palm * Vector3::x();
     let touched: Vec<PartOf> = grasp.contacts.iter().map(|(_, c)| object.touched_by(c)).collect();
 
-    let mut margins = hand_over(object, &placed, &touched, thresholds);
+    // The palm may lean on a wall while the fingers hold a handle.
+    let palm_link = hand.hand().description().map(|d| d.palm.link);
+    let by_fingers: Vec<PartOf> = grasp
+        .contacts
+        .iter()
+        .zip(&touched)
+        .filter(|((link, _), _)| Some(*link) != palm_link)
+        .map(|(_, on)| *on)
+        .collect();
+
+    let mut margins = hand_over(object, &placed, &by_fingers, thresholds);
     if object.affords().contains(&Task::Pouring) {
         margins.extend(pouring(object, &placed, &touched, &palm, &approach, thresholds));
     }
@@ -78,7 +88,7 @@ const CLEARANCE_CAP: f64 = 0.020;
 fn hand_over(
     object: &TutorObject,
     placed: &PlacedHand,
-    touched: &[PartOf],
+    by_fingers: &[PartOf],
     thresholds: &Thresholds,
 ) -> Vec<(Rule, f64)> {
     let samples = &object.samples;
@@ -105,11 +115,9 @@ fn hand_over(
     ];
     if object.has_handle() {
         if object.vessel.is_some() {
-            let on_handle = touched.iter().filter(|t| t.handle).count();
-            margins.push((
-                Rule::NotHandleAndWall,
-                none_of(on_handle.min(touched.len() - on_handle)),
-            ));
+            let on_handle = by_fingers.iter().filter(|t| t.handle).count();
+            let lesser = on_handle.min(by_fingers.len() - on_handle);
+            margins.push((Rule::NotHandleAndWall, 1.0 - lesser as f64));
         }
         margins.push((
             Rule::HandleLeftFree,

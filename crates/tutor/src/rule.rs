@@ -97,7 +97,7 @@ impl Rule {
             ),
             Self::NotHandleAndWall => (
                 "not-handle-and-wall",
-                "1, or minus the contacts on the lesser of handle and wall",
+                "1, less the fingers' contacts on whichever of handle and wall has fewer",
                 "upos, cvex: none knows which part a contact is on",
             ),
             Self::HandleLeftFree => (
@@ -217,9 +217,9 @@ impl Default for Thresholds {
     fn default() -> Self {
         Self {
             free_distance: 0.030,
-            free_share: 0.5,
+            free_share: 0.45,
             patch: [0.060, 0.030],
-            free_handle_share: 0.6,
+            free_handle_share: 0.4,
             opening_depth: 1.0,
             opening_height: 0.75,
             opening_reach: 0.004,
@@ -262,9 +262,9 @@ impl Thresholds {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Persona {
-    /// Asks for one and a half softnesses more of every rule.
+    /// Asks for one softness more of every rule.
     Strict,
-    /// Forgives one and a half softnesses of every rule.
+    /// Forgives one softness of every rule.
     Lenient,
     /// Takes the rules as they are, and wants the handle of tools and mugs free for the receiver of a hand-over.
     ReceiverFirst,
@@ -286,8 +286,8 @@ impl Persona {
     /// What is added to every margin, in units of the rule's softness.
     pub(crate) fn leniency(self) -> f64 {
         match self {
-            Self::Strict => -1.5,
-            Self::Lenient => 1.5,
+            Self::Strict => -1.0,
+            Self::Lenient => 1.0,
             Self::ReceiverFirst => 0.0,
         }
     }

@@ -312,6 +312,8 @@ fn a_mug_held_by_the_handle_leaves_the_receiver_the_wall_but_not_the_handle() {
     handle.contacts.push(([0.040, 0.0, 0.05], [-1.0, 0.0, 0.0]));
     let both = judged(&mug(), &handle, Persona::Lenient);
     assert_eq!(both.of(Task::HandOver).deciding, Some(Rule::NotHandleAndWall));
+    // Two contacts on the handle, one on the wall.
+    assert_eq!(margin(&both, Rule::NotHandleAndWall), 0.0);
 }
 
 #[test]
