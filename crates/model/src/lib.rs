@@ -29,6 +29,7 @@ mod error;
 mod network;
 mod table;
 
+mod binary;
 mod cpd;
 mod json;
 mod model;
@@ -44,14 +45,19 @@ mod answer;
 mod evidence;
 mod posterior;
 
+mod batch;
+mod explain;
+
 mod gaussian;
 mod sphere;
 
 pub use answer::{Answer, Mixture, Target, Term};
+pub use batch::{BatchQuery, RowAnswer};
 pub use cell::{CellReport, OrderScore};
 pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign};
 pub use error::ModelError;
 pub use evidence::{Evidence, Observation};
+pub use explain::{Contrast, Explanation, MostProbable, ProbableValue};
 pub use model::{Model, Node};
 pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, Weights};
 pub use table::{Column, Table};

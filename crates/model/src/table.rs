@@ -147,8 +147,12 @@ impl Table {
         })
     }
 
-    /// Numbers of a column, NaN where missing. Texts are read as numbers.
-    pub(crate) fn numbers(&self, column: &str, node: &str) -> Result<Vec<f64>, ModelError> {
+    /// Numbers of a column, NaN where missing; texts are read as numbers. `node` is who asks, for messages.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::MissingColumn`], [`ModelError::Cell`].
+    pub fn numbers(&self, column: &str, node: &str) -> Result<Vec<f64>, ModelError> {
         let bad = |row: usize, found: String| ModelError::Cell {
             column: column.into(),
             row,
@@ -174,8 +178,12 @@ impl Table {
         }
     }
 
-    /// Cells of a column as texts, `None` where missing. Numbers are printed.
-    pub(crate) fn texts(&self, column: &str, node: &str) -> Result<Vec<Option<String>>, ModelError> {
+    /// Cells of a column as texts, `None` where missing; numbers are printed. `node` is who asks, for messages.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::MissingColumn`].
+    pub fn texts(&self, column: &str, node: &str) -> Result<Vec<Option<String>>, ModelError> {
         Ok(match self.require(column, node)? {
             Column::Numbers(values) => values
                 .iter()

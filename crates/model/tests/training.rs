@@ -48,7 +48,11 @@ fn samples_give_back_the_model_they_came_from() {
     let truth = Model::from_json(TRUTH).unwrap();
     let table = truth.sample(4000, 1);
     let Trained { model, report } = trained(&table);
-    let components: Vec<Vec<usize>> = report.nodes.iter().map(|node| node.components()).collect();
+    let components: Vec<Vec<usize>> = report
+        .nodes
+        .iter()
+        .map(prehend_model::NodeReport::components)
+        .collect();
     assert_eq!(components, [vec![], vec![1, 2], vec![2, 1]]);
     let held_out = truth.sample(2000, 2);
     let mean = |model: &Model| model.log_likelihood(&held_out).unwrap().iter().sum::<f64>() / 2000.0;

@@ -71,9 +71,9 @@ pub(crate) fn grouped_bars(
         .with_y_label(unit)
         .with_y_axis_min(0.0)
         .with_y_axis_max(1.0)
-        .with_legend_position(LegendPosition::OutsideTopCenter)
+        .with_legend_position(LegendPosition::OutsideBottomColumns)
         .with_legend_box(false);
-    draw(name, alt, plots, layout, (480.0, 300.0))
+    draw(name, alt, plots, layout, (480.0, 250.0))
 }
 
 /// Lines with a dash of their own each, and a legend.
@@ -134,7 +134,7 @@ fn draw(name: &str, alt: &str, plots: Vec<Plot>, layout: Layout, (width, height)
         .with_label_size(12)
         .with_body_size(11)
         .with_axis_line_width(1.0);
-    let svg = kuva::render_to_svg(plots, layout);
+    let svg = own_ids(&kuva::render_to_svg(plots, layout), name);
     let (width, height) = size(&svg).unwrap_or((width, height));
     let view_box = format!(r#"<svg viewBox="0 0 {width} {height}""#);
     let svg = svg.replacen("<svg", &view_box, 1);
@@ -152,6 +152,25 @@ fn draw(name: &str, alt: &str, plots: Vec<Plot>, layout: Layout, (width, height)
         width,
         height,
     }
+}
+
+/// The SVG with ids of its own. The chart crate numbers its clip paths by a counter that all charts of a process share,
+/// so its bytes would depend on what else was drawn before, and in which order.
+fn own_ids(svg: &str, name: &str) -> String {
+    const PREFIX: &str = "kuva-clip-";
+    let mut pieces = svg.split(PREFIX);
+    let mut seen: Vec<&str> = Vec::new();
+    let mut own = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let digits = piece.find(|c: char| !c.is_ascii_digit()).unwrap_or(piece.len());
+        let (number, rest) = piece.split_at(digits);
+        let position = seen.iter().position(|n| *n == number).unwrap_or_else(|| {
+            seen.push(number);
+            seen.len() - 1
+        });
+        own.extend([name, "-clip-", &position.to_string(), rest]);
+    }
+    own
 }
 
 /// Width and height from the first tag: the chart crate adds room for axes and legend.
@@ -190,6 +209,14 @@ mod tests {
             figure.svg.contains(&format!("\"{ACCENT}\"")),
             "colours stay whole attributes"
         );
+    }
+
+    #[test]
+    fn clip_paths_are_numbered_within_their_chart() {
+        let svg = r#"<clipPath id="kuva-clip-41"/><g clip-path="url(#kuva-clip-41)"/><g clip-path="url(#kuva-clip-9)"/>"#;
+        let own =
+            r#"<clipPath id="x-clip-0"/><g clip-path="url(#x-clip-0)"/><g clip-path="url(#x-clip-1)"/>"#;
+        assert_eq!(own_ids(svg, "x"), own);
     }
 
     #[test]

@@ -75,9 +75,8 @@ impl Icosphere {
         shifted.into_iter().map(|d| d / integral).collect()
     }
 
-    /// Value between the directions: linear over the face that the direction passes through. `values` has one entry a
-    /// direction.
-    pub fn interpolate(&self, values: &[f64], direction: &Vector3<f64>) -> f64 {
+    /// The face that a direction passes through: its three directions and their weights, which add up to 1.
+    pub fn locate(&self, direction: &Vector3<f64>) -> [(usize, f64); 3] {
         let corner = |v: u32| self.directions[v as usize].as_ref();
         // Coordinates of the direction in the cone of a face; the least is ≥ 0 inside.
         let coordinates = |face: &[u32; 3]| {
@@ -90,7 +89,7 @@ impl Icosphere {
             (w, w[0].min(w[1]).min(w[2]))
         };
         let mut candidates = 0..20;
-        let mut inside = ([0.0; 3], [0; 3]);
+        let mut inside = ([1.0, 0.0, 0.0], [0; 3]);
         for faces in &self.levels {
             let mut best = (f64::NEG_INFINITY, 0);
             for f in candidates {
@@ -104,7 +103,16 @@ impl Icosphere {
         }
         let (w, face) = inside;
         let sum: f64 = w.iter().sum();
-        (0..3).map(|k| w[k] / sum * values[face[k] as usize]).sum()
+        std::array::from_fn(|k| (face[k] as usize, w[k] / sum))
+    }
+
+    /// Value between the directions: linear over the face that the direction passes through. `values` has one entry a
+    /// direction.
+    pub fn interpolate(&self, values: &[f64], direction: &Vector3<f64>) -> f64 {
+        self.locate(direction)
+            .iter()
+            .map(|(v, weight)| weight * values[*v])
+            .sum()
     }
 }
 

@@ -1,4 +1,42 @@
 //! How do results become figures and one page?
+//!
+//! The crate knows no files. It takes numbers, meshes and hands, and gives back a page ([`render_page`]) and the
+//! figures beside it as bytes. The caller fills [`ReportData`] and writes what comes back; nothing is read, timed or
+//! drawn at random here, so the same data give the same bytes.
+//!
+//! **Pictures.** A [`Scene`] holds bodies, lines and dots; [`draw`] rasterises it through an orthographic [`Camera`]:
+//! depth buffer, 3 × 3 samples a pixel, normals smoothed where faces meet at less than 45°, three lights that go with the
+//! camera, dark lines at rims and creases, a transparent ground. [`Scene::boxes`], [`Scene::parts`] and [`Scene::grasp`]
+//! compose what the report shows; [`encode_png`] makes files of it. Meshes are prepared once as [`DisplayMesh`], hands as
+//! [`HandShape`], and drawn often.
+//!
+//! **Maps.** [`Icosphere`] gives directions and weights, [`sphere_sheet`] draws densities over them: six views with the
+//! object inside, and two equal-area discs.
+//!
+//! **Charts.** Bars and curves come from the chart crate `kuva`, behind a module of our own; confusion matrices and bars
+//! under pictures hold text and images in places that it has no room for, and are drawn here as SVG. Colours are written
+//! plainly in the figures' files and become CSS variables in the page, which follows the reader's light or dark theme.
+//!
+//! **The page** needs no script and no other file, and forbids itself both. Every experiment is told the same way:
+//! question, answer, figures and tables, how it was measured, what it does not show ([`Account`]).
+//!
+//! # Examples
+//!
+//! ```
+//! use std::sync::Arc;
+//! use prehend_geometry::{OrientedBox, Solid};
+//! use prehend_report::{DisplayMesh, ObjectSection, ReportData, Scene, View, render_page};
+//!
+//! let ball = Arc::new(DisplayMesh::new(&Solid::Sphere { radius: 0.03 }.display_mesh()));
+//! let boxes = Scene::boxes(&ball, &[OrientedBox::centered([0.06; 3])]);
+//! let boxes = boxes.picture(View::Oblique, 80, "ball-boxes", "A ball in its box.")?;
+//! let ball = ObjectSection { name: "ball".into(), object_type: "toy".into(), boxes, ..ObjectSection::default() };
+//!
+//! let page = render_page(&ReportData { objects: vec![ball], ..ReportData::default() });
+//! assert!(page.html.contains("A ball in its box."));
+//! assert_eq!(page.figures[0].0, "ball-boxes.png");
+//! # Ok::<(), prehend_report::ReportError>(())
+//! ```
 
 mod camera;
 mod charts;
@@ -28,7 +66,7 @@ pub use error::ReportError;
 pub use figure::Figure;
 pub use icosphere::Icosphere;
 pub use page::{Page, ReportData, render_page};
-pub use palette::{cividis, task_color, task_shape};
+pub use palette::{task_color, task_shape, viridis};
 pub use palette_png::encode_png;
 pub use picture::Picture;
 pub use raster::{DrawOptions, Raster, draw};

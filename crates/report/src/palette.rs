@@ -11,8 +11,10 @@ pub const MUTED: &str = "#5a6270";
 pub const RULE: &str = "#d5d9de";
 /// Bars that mean no task in particular.
 pub const ACCENT: &str = "#3b6ea5";
-/// Text on a surface of [`ACCENT`].
-pub const ON_ACCENT: &str = "#fffffe";
+/// Shade of cells, at up to [`SHADE_MOST`] of its strength, so that [`INK`] stays readable on it.
+pub const SHADE: &str = "#3b6ea4";
+/// Largest opacity of [`SHADE`] under text.
+pub const SHADE_MOST: f64 = 0.72;
 /// Marks of rejected things.
 pub const REJECTED: &str = "#a8aeb8";
 /// The page's background.
@@ -29,7 +31,7 @@ const THEME: [(&str, &str, &str); 11] = [
     ("muted", MUTED, "#9aa3af"),
     ("rule", RULE, "#363b42"),
     ("accent", ACCENT, "#7fb0e0"),
-    ("on-accent", ON_ACCENT, "#14171a"),
+    ("shade", SHADE, "#3f74b0"),
     ("rejected", REJECTED, "#6b7480"),
     ("paper", PAPER, "#14171a"),
     ("task-0", TASKS[0], "#56b4e9"),
@@ -50,16 +52,18 @@ pub fn task_shape(task_idx: usize) -> &'static str {
 
 /// The CSS that defines the colours as variables, for light, dark, and print.
 pub(crate) fn css_variables() -> String {
-    let list = |dark: bool| -> String {
+    let list = |dark: bool| {
         THEME
             .iter()
-            .map(|(name, l, d)| format!("--{name}:{};", if dark { d } else { l }))
-            .collect()
+            .fold(String::new(), |mut css, (name, on_light, on_dark)| {
+                let color = if dark { on_dark } else { on_light };
+                css.extend(["--", name, ":", color, ";"]);
+                css
+            })
     };
+    let (light, dark) = (list(false), list(true));
     format!(
-        ":root{{color-scheme:light dark;{}}}@media screen and (prefers-color-scheme:dark){{:root{{{}}}}}",
-        list(false),
-        list(true)
+        ":root{{color-scheme:light dark;{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}"
     )
 }
 
@@ -70,29 +74,35 @@ pub(crate) fn follow_theme(svg: &str) -> String {
     })
 }
 
-/// Cividis, ten even steps from low to high.
-pub const CIVIDIS: [[u8; 3]; 10] = [
-    [0x00, 0x22, 0x4e],
-    [0x12, 0x35, 0x70],
-    [0x3b, 0x49, 0x6c],
-    [0x57, 0x5d, 0x6d],
-    [0x70, 0x71, 0x73],
-    [0x8a, 0x86, 0x78],
-    [0xa5, 0x9c, 0x74],
-    [0xc3, 0xb3, 0x69],
-    [0xe1, 0xcc, 0x55],
-    [0xfe, 0xe8, 0x38],
+/// Viridis, ten even steps from low to high. Its middle is green, so that a grey object stays visible upon it.
+pub const VIRIDIS: [[u8; 3]; 10] = [
+    [0x44, 0x01, 0x54],
+    [0x48, 0x28, 0x78],
+    [0x3e, 0x49, 0x89],
+    [0x31, 0x68, 0x8e],
+    [0x26, 0x82, 0x8e],
+    [0x1f, 0x9e, 0x89],
+    [0x35, 0xb7, 0x79],
+    [0x6d, 0xcd, 0x59],
+    [0xb4, 0xde, 0x2c],
+    [0xfd, 0xe7, 0x25],
 ];
 
-/// A colour of [`CIVIDIS`] for `t` in [0, 1]; outside is clamped, NaN counts as 0.
-pub fn cividis(t: f64) -> [u8; 3] {
-    let position = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) } * (CIVIDIS.len() - 1) as f64;
-    let low = (position.floor() as usize).min(CIVIDIS.len() - 2);
+/// A colour of [`VIRIDIS`] for `t` in [0, 1]; outside is clamped, NaN counts as 0.
+pub fn viridis(t: f64) -> [u8; 3] {
+    let position = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) } * (VIRIDIS.len() - 1) as f64;
+    let low = (position.floor() as usize).min(VIRIDIS.len() - 2);
     let part = position - low as f64;
     std::array::from_fn(|k| {
-        let (a, b) = (f64::from(CIVIDIS[low][k]), f64::from(CIVIDIS[low + 1][k]));
+        let (a, b) = (f64::from(VIRIDIS[low][k]), f64::from(VIRIDIS[low + 1][k]));
         (a + (b - a) * part).round() as u8
     })
+}
+
+/// The scale of [`viridis`] as a CSS gradient.
+pub(crate) fn css_gradient() -> String {
+    let steps = VIRIDIS.map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}"));
+    format!("linear-gradient(to right,{})", steps.join(","))
 }
 
 #[cfg(test)]
@@ -132,6 +142,19 @@ mod tests {
     }
 
     #[test]
+    fn text_on_the_darkest_cell_reaches_four_and_a_half() {
+        let mixed = |top: &str, ground: &str| {
+            let channel = |hex: &str, at: usize| f64::from(u8::from_str_radix(&hex[at..at + 2], 16).unwrap());
+            let mix = |at| SHADE_MOST * channel(top, at) + (1.0 - SHADE_MOST) * channel(ground, at);
+            format!("#{:02x}{:02x}{:02x}", mix(1) as u8, mix(3) as u8, mix(5) as u8)
+        };
+        let of = |name: &str| THEME.iter().find(|t| t.0 == name).unwrap();
+        let (ink, shade, paper) = (of("ink"), of("shade"), of("paper"));
+        assert!(contrast(ink.1, &mixed(shade.1, paper.1)) >= 4.5);
+        assert!(contrast(ink.2, &mixed(shade.2, paper.2)) >= 4.5);
+    }
+
+    #[test]
     fn colours_follow_the_theme_only_where_they_are_whole_attributes() {
         assert_eq!(
             follow_theme("fill=\"#1a1d21\" d=\"#1a1d21x\""),
@@ -140,11 +163,11 @@ mod tests {
     }
 
     #[test]
-    fn cividis_meets_its_ends_and_clamps() {
-        assert_eq!(cividis(-3.0), CIVIDIS[0]);
-        assert_eq!(cividis(f64::NAN), CIVIDIS[0]);
-        assert_eq!(cividis(1.0), CIVIDIS[9]);
-        assert_eq!(cividis(7.0), CIVIDIS[9]);
-        assert_eq!(cividis(4.0 / 9.0), CIVIDIS[4]);
+    fn viridis_meets_its_ends_and_clamps() {
+        assert_eq!(viridis(-3.0), VIRIDIS[0]);
+        assert_eq!(viridis(f64::NAN), VIRIDIS[0]);
+        assert_eq!(viridis(1.0), VIRIDIS[9]);
+        assert_eq!(viridis(7.0), VIRIDIS[9]);
+        assert_eq!(viridis(4.0 / 9.0), VIRIDIS[4]);
     }
 }

@@ -105,6 +105,8 @@ struct Canvas<'a> {
     width: usize,
     height: usize,
     samples: usize,
+    /// Samples to a unit of width: pixels in small pictures, growing with the picture beyond 200 pixels.
+    unit: f64,
     camera: &'a Camera,
     /// Samples a metre.
     scale: f64,
@@ -121,6 +123,7 @@ impl<'a> Canvas<'a> {
             width,
             height,
             samples,
+            unit: samples as f64 * (width.min(height) as f64 / samples as f64 / 200.0).max(1.0),
             camera,
             scale: width.min(height) as f64 / 2.0 / camera.half_size,
             depth: vec![f32::NEG_INFINITY; n],
@@ -236,7 +239,7 @@ impl<'a> Canvas<'a> {
                 }
             }
         }
-        let reach = (self.samples / 2) as isize;
+        let reach = (self.unit / 2.0).floor() as isize;
         let mut dark = vec![false; w * h];
         for (x, y) in rim {
             for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
@@ -295,7 +298,7 @@ impl<'a> Canvas<'a> {
 
     fn line(&mut self, line: &Line) {
         let [a, b] = line.ends.map(|p| self.place(&p));
-        let radius = (line.width * self.samples as f64 / 2.0).max(0.5);
+        let radius = (line.width * self.unit / 2.0).max(0.5);
         let along = (b - a).xy();
         let length2 = along.norm_squared();
         let bias = 0.006 * self.camera.half_size;
@@ -338,8 +341,8 @@ impl<'a> Canvas<'a> {
             .collect();
         placed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.z.total_cmp(&b.1.z)));
         for (seen, at, dot) in placed {
-            let radius = dot.radius * self.samples as f64;
-            let rim = radius + self.samples as f64;
+            let radius = dot.radius * self.unit;
+            let rim = radius + self.unit;
             let (fill, light) = (Rgba::opaque(dot.color), Rgba::opaque([255, 255, 255]));
             let Some([x0, y0, x1, y1]) = self.window([at.x, at.y, at.x, at.y], rim) else {
                 continue;
@@ -407,7 +410,7 @@ impl Light {
         let turn = if z < 0.0 { -1.0 / length } else { 1.0 / length };
         let n = [x * turn, y * turn, z * turn];
         let dot = |a: [f32; 3]| a[0] * n[0] + a[1] * n[1] + a[2] * n[2];
-        0.22 * (0.5 + 0.5 * dot(self.sky)) + 0.20 * n[2] + 0.62 * dot(self.key).max(0.0)
+        0.30 * (0.5 + 0.5 * dot(self.sky)) + 0.24 * n[2] + 0.52 * dot(self.key).max(0.0)
     }
 }
 

@@ -38,7 +38,7 @@ pub struct Line {
     pub ends: [Point3<f64>; 2],
     /// sRGB.
     pub color: [u8; 3],
-    /// Pixels.
+    /// Pixels, in pictures of at most 200 pixels; it grows with larger ones.
     pub width: f64,
     /// Opacity where nothing stands before it.
     pub opacity: f64,
@@ -51,7 +51,7 @@ pub struct Line {
 pub struct Dot {
     /// Where.
     pub center: Point3<f64>,
-    /// Pixels, without the rim.
+    /// Pixels without the rim, in pictures of at most 200 pixels; it grows with larger ones.
     pub radius: f64,
     /// sRGB.
     pub color: [u8; 3],

@@ -4,13 +4,14 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use rayon::prelude::*;
 
 use crate::ReportError;
 use crate::camera::Camera;
 use crate::display_mesh::DisplayMesh;
 use crate::icosphere::Icosphere;
 use crate::linear_light::{Rgba, to_srgb};
-use crate::palette::cividis;
+use crate::palette::viridis;
 use crate::palette_png::encode_png;
 use crate::picture::Picture;
 use crate::raster::{DrawOptions, Raster, draw};
@@ -81,8 +82,7 @@ pub fn sphere_sheet(
 ) -> Result<SphereSheet, ReportError> {
     let scene = Scene::object(object);
     let radius = 1.08 * scene.points().map(|p| (p - center).norm()).fold(1e-6, f64::max);
-    let mut pictures = Vec::new();
-    for view in View::SIX {
+    let seen = |view: &View| {
         let camera = Camera {
             camera_from_world: view.camera_from_world(),
             center: *center,
@@ -90,95 +90,129 @@ pub fn sphere_sheet(
         };
         let mut raster = draw(&scene, &camera, &DrawOptions::square(size))?;
         fade(&mut raster);
-        pictures.push(Picture {
+        Ok(Picture {
             name: String::new(),
             png: encode_png(&raster),
             alt: String::new(),
-        });
-    }
-    let rows = maps
+        })
+    };
+    let object = View::SIX
+        .par_iter()
+        .map(seen)
+        .collect::<Result<Vec<_>, ReportError>>()?;
+    let maps = maps
         .iter()
-        .map(|map| row(grid, map, size))
-        .collect::<Result<_, _>>()?;
-    Ok(SphereSheet {
-        object: pictures,
-        rows,
-    })
+        .map(|map| Ratios::new(grid, map))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut rows: Vec<SphereRow> = maps.iter().map(Ratios::numbers).collect();
+    // What a pixel looks at is the same for all maps.
+    let panels: Vec<Panel> = View::SIX
+        .map(Panel::View)
+        .into_iter()
+        .chain([Panel::Disc(View::Top), Panel::Disc(View::Bottom)])
+        .collect();
+    let drawn: Vec<Vec<Picture>> = panels
+        .par_iter()
+        .map(|panel| {
+            let pixels = panel.pixels(grid, size);
+            maps.iter().map(|map| panel.draw(map, &pixels, size)).collect()
+        })
+        .collect();
+    for (panel, of_maps) in panels.iter().zip(drawn) {
+        for (row, picture) in rows.iter_mut().zip(of_maps) {
+            match panel {
+                Panel::View(_) => row.views.push(picture),
+                Panel::Disc(_) => row.discs.push(picture),
+            }
+        }
+    }
+    Ok(SphereSheet { object, rows })
 }
 
 /// The object lies over the map as a drawing: its surface lets most of the colour through, its lines stay.
 fn fade(raster: &mut Raster) {
     for pixel in raster.rgba.chunks_exact_mut(4) {
         let dark = 255 - pixel[..3].iter().copied().max().unwrap_or(0);
-        let share = 0.30 + 0.70 * (f64::from(dark) / 200.0).powi(2).min(1.0);
+        let share = 0.34 + 0.66 * (f64::from(dark) / 200.0).powi(2).min(1.0);
         pixel[3] = (f64::from(pixel[3]) * share).round() as u8;
     }
 }
 
-fn row(grid: &Icosphere, map: &SphereMap, size: usize) -> Result<SphereRow, ReportError> {
-    let expected = grid.directions().len();
-    if map.density.len() != expected {
-        let found = map.density.len();
-        return Err(ReportError::MapSize {
-            map: map.task.clone(),
-            expected,
-            found,
-        });
+/// A map as density over the uniform density.
+struct Ratios<'a> {
+    grid: &'a Icosphere,
+    map: &'a SphereMap,
+    ratio: Vec<f64>,
+    /// Base-2 logarithms, for drawing.
+    log: Vec<f64>,
+    /// Ratio at the border of the densest half and nine tenths, and their shares of the sphere.
+    regions: [(f64, f64); 2],
+}
+
+impl<'a> Ratios<'a> {
+    fn new(grid: &'a Icosphere, map: &'a SphereMap) -> Result<Self, ReportError> {
+        let (expected, found) = (grid.directions().len(), map.density.len());
+        if found != expected {
+            return Err(ReportError::MapSize {
+                map: map.task.clone(),
+                expected,
+                found,
+            });
+        }
+        let integral = grid.integral(&map.density);
+        let usable = map.density.iter().all(|d| *d >= 0.0) && integral.is_finite() && integral > 0.0;
+        if !usable {
+            return Err(ReportError::MapDensity {
+                map: map.task.clone(),
+                integral,
+            });
+        }
+        let ratio: Vec<f64> = map.density.iter().map(|d| d / integral * 4.0 * PI).collect();
+        let log = ratio.iter().map(|r| r.max(1e-12).log2()).collect();
+        let regions = densest(grid, &ratio);
+        Ok(Self {
+            grid,
+            map,
+            ratio,
+            log,
+            regions,
+        })
     }
-    let integral = grid.integral(&map.density);
-    let usable = map.density.iter().all(|d| *d >= 0.0) && integral.is_finite() && integral > 0.0;
-    if !usable {
-        return Err(ReportError::MapDensity {
-            map: map.task.clone(),
-            integral,
-        });
-    }
-    // Density over the uniform density, and its logarithm to base 2 for drawing.
-    let ratio: Vec<f64> = map.density.iter().map(|d| d / integral * 4.0 * PI).collect();
-    let log: Vec<f64> = ratio.iter().map(|r| r.max(1e-12).log2()).collect();
-    let regions = densest(grid, &ratio);
-    // Directions on the border between two halves count for both by half.
-    let share = |along: fn(&UnitVector3<f64>) -> f64| -> f64 {
-        let part = |i: usize, x: f64| {
-            let half = if x.abs() < 1e-9 {
-                0.5
-            } else {
-                f64::from(u8::from(x > 0.0))
+
+    /// The row without its pictures.
+    fn numbers(&self) -> SphereRow {
+        let (grid, ratio) = (self.grid, &self.ratio);
+        // Directions on the border between two halves count for both by half.
+        let share = |along: fn(&UnitVector3<f64>) -> f64| -> f64 {
+            let part = |i: usize, x: f64| {
+                let half = if x.abs() < 1e-9 {
+                    0.5
+                } else {
+                    f64::from(u8::from(x > 0.0))
+                };
+                half * grid.weights()[i] * ratio[i] / (4.0 * PI)
             };
-            half * grid.weights()[i] * ratio[i] / (4.0 * PI)
+            grid.directions()
+                .iter()
+                .enumerate()
+                .map(|(i, d)| part(i, along(d)))
+                .sum()
         };
-        grid.directions()
-            .iter()
-            .enumerate()
-            .map(|(i, d)| part(i, along(d)))
-            .sum()
-    };
-    let best = (0..ratio.len())
-        .max_by(|&a, &b| ratio[a].total_cmp(&ratio[b]).then(b.cmp(&a)))
-        .unwrap_or(0);
-    let alt = |what: &str| format!("{}: density over uniform, {what}.", map.task);
-    let levels = regions.map(|r| r.0.log2());
-    let views = View::SIX.iter().map(|view| Picture {
-        name: String::new(),
-        png: encode_png(&shell(grid, &log, *view, size, levels)),
-        alt: alt(view.title()),
-    });
-    let discs = [1.0, -1.0].iter().zip(DISC_TITLES).map(|(side, title)| Picture {
-        name: String::new(),
-        png: encode_png(&disc(grid, &log, *side, size, levels, &map.marks)),
-        alt: alt(title),
-    });
-    Ok(SphereRow {
-        task: map.task.clone(),
-        views: views.collect(),
-        discs: discs.collect(),
-        peak: ratio[best],
-        peak_direction: grid.directions()[best].into_inner().into(),
-        area_of_half: regions[0].1,
-        area_of_nine_tenths: regions[1].1,
-        above: share(|d| d.z),
-        in_front: share(|d| d.x),
-    })
+        let best = (0..ratio.len())
+            .max_by(|&a, &b| ratio[a].total_cmp(&ratio[b]).then(b.cmp(&a)))
+            .unwrap_or(0);
+        SphereRow {
+            task: self.map.task.clone(),
+            views: Vec::new(),
+            discs: Vec::new(),
+            peak: ratio[best],
+            peak_direction: grid.directions()[best].into_inner().into(),
+            area_of_half: self.regions[0].1,
+            area_of_nine_tenths: self.regions[1].1,
+            above: share(|d| d.z),
+            in_front: share(|d| d.x),
+        }
+    }
 }
 
 /// Density at the border of the densest regions that hold 50 and 90 % of the probability, and their shares of the
@@ -200,51 +234,77 @@ fn densest(grid: &Icosphere, ratio: &[f64]) -> [(f64, f64); 2] {
     })
 }
 
-/// The half of the sphere that a view sees, seen orthographically; the sphere fills the picture.
-fn shell(grid: &Icosphere, log: &[f64], view: View, size: usize, levels: [f64; 2]) -> Raster {
-    let world_from_camera = view.camera_from_world().inverse();
-    paint(size, levels, |x, y| {
-        let r2 = x * x + y * y;
-        (r2 <= 1.0)
-            .then(|| grid.interpolate(log, &(world_from_camera * Vector3::new(x, y, (1.0 - r2).sqrt()))))
-    })
+/// One picture of a sphere.
+#[derive(Clone, Copy)]
+enum Panel {
+    /// The half that a view sees, orthographically; the sphere fills the picture.
+    View(View),
+    /// The half about a view's axis as Lambert's azimuthal equal-area disc, oriented like the view.
+    Disc(View),
 }
 
-/// Lambert's azimuthal equal-area disc about +z (`side` 1) or −z (−1), oriented like the views from there.
-///
-/// ```text
-/// r = √2 sin(θ/2), θ the angle from the axis: r = 1 at the equator
-/// ```
-fn disc(
-    grid: &Icosphere,
-    log: &[f64],
-    side: f64,
-    size: usize,
-    levels: [f64; 2],
-    marks: &[Vector3<f64>],
-) -> Raster {
-    let view = if side > 0.0 { View::Top } else { View::Bottom };
-    let camera_from_world = view.camera_from_world();
-    let mut raster = paint(size, levels, |x, y| {
-        let r2 = x * x + y * y;
-        // cos θ = 1 − 2 sin²(θ/2) = 1 − r².
-        let (cos, stretch) = (1.0 - r2, (2.0 - r2).sqrt());
-        let seen = Vector3::new(x * stretch, y * stretch, cos);
-        (r2 <= 1.0).then(|| grid.interpolate(log, &(camera_from_world.inverse() * seen)))
-    });
+/// What each sample of a picture looks at: three directions of the grid and their weights; nothing beside the sphere.
+type Pixels = Vec<Option<[(usize, f64); 3]>>;
+
+/// Samples along each side of a pixel.
+const SAMPLES: usize = 2;
+
+impl Panel {
+    fn pixels(self, grid: &Icosphere, size: usize) -> Pixels {
+        let n = SAMPLES * size;
+        let at = |i: usize| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
+        let (Panel::View(view) | Panel::Disc(view)) = self;
+        let world_from_camera = view.camera_from_world().inverse();
+        (0..n * n)
+            .map(|i| {
+                let (x, y) = (at(i % n), -at(i / n));
+                let r2 = x * x + y * y;
+                let seen = match self {
+                    Panel::View(_) => Vector3::new(x, y, (1.0 - r2).max(0.0).sqrt()),
+                    // r = √2 sin(θ/2), so that r = 1 at the equator and cos θ = 1 − r².
+                    Panel::Disc(_) => Vector3::new(
+                        x * (2.0 - r2).max(0.0).sqrt(),
+                        y * (2.0 - r2).max(0.0).sqrt(),
+                        1.0 - r2,
+                    ),
+                };
+                (r2 <= 1.0).then(|| grid.locate(&(world_from_camera * seen)))
+            })
+            .collect()
+    }
+
+    fn draw(self, map: &Ratios, pixels: &Pixels, size: usize) -> Picture {
+        let mut raster = paint(size, map.regions.map(|r| r.0.log2()), &map.log, pixels);
+        let what = match self {
+            Panel::View(view) => view.title(),
+            Panel::Disc(view) => {
+                dots(&mut raster, view, &map.map.marks);
+                DISC_TITLES[usize::from(view != View::Top)]
+            }
+        };
+        let alt = format!("{}: density over uniform, {what}.", map.map.task);
+        Picture {
+            name: String::new(),
+            png: encode_png(&raster),
+            alt,
+        }
+    }
+}
+
+/// Marks on the disc about a view's axis, those of its half.
+fn dots(raster: &mut Raster, view: View, marks: &[Vector3<f64>]) {
+    let size = raster.width as f64;
     for mark in marks {
-        let Some(seen) = mark
-            .try_normalize(1e-9)
-            .map(|m| camera_from_world * m)
-            .filter(|m| m.z >= 0.0)
-        else {
+        let Some(unit) = mark.try_normalize(1e-9) else {
             continue;
         };
-        let shrink = (1.0 + seen.z).sqrt();
-        let at = |v: f64| (v / shrink + 1.0) / 2.0 * size as f64;
-        dot(&mut raster, at(seen.x), size as f64 - at(seen.y));
+        let seen = view.camera_from_world() * unit;
+        if seen.z >= 0.0 {
+            let shrink = (1.0 + seen.z).sqrt();
+            let at = |v: f64| size / 2.0 * (1.0 + v / shrink);
+            dot(raster, at(seen.x), size - at(seen.y));
+        }
     }
-    raster
 }
 
 fn dot(raster: &mut Raster, x: f64, y: f64) {
@@ -263,12 +323,12 @@ fn dot(raster: &mut Raster, x: f64, y: f64) {
     }
 }
 
-/// Colours a square of [−1, 1]² by the base-2 logarithm that `value` gives, ¼ to 16, with a line where it crosses a
-/// level; clear where it gives nothing.
-fn paint(size: usize, levels: [f64; 2], value: impl Fn(f64, f64) -> Option<f64>) -> Raster {
-    let n = 2 * size;
-    let at = |i: usize| (i as f64 + 0.5) / size as f64 - 1.0;
-    let values: Vec<Option<f64>> = (0..n * n).map(|i| value(at(i % n), -at(i / n))).collect();
+/// Colours each sample by the base-2 logarithm of its density, ¼ to 16, with a line where it crosses a level; clear
+/// beside the sphere.
+fn paint(size: usize, levels: [f64; 2], log: &[f64], pixels: &Pixels) -> Raster {
+    let n = SAMPLES * size;
+    let value = |at: &[(usize, f64); 3]| at.iter().map(|(v, weight)| weight * log[*v]).sum();
+    let values: Vec<Option<f64>> = pixels.iter().map(|p| p.as_ref().map(value)).collect();
     let crosses = |i: usize, j: usize, level: f64| match (values[i], values[j]) {
         (Some(a), Some(b)) => (a >= level) != (b >= level),
         _ => false,
@@ -276,7 +336,7 @@ fn paint(size: usize, levels: [f64; 2], value: impl Fn(f64, f64) -> Option<f64>)
     let sample = |x: usize, y: usize| -> Rgba {
         let i = y * n + x;
         let Some(v) = values[i] else { return Rgba::CLEAR };
-        let color = Rgba::opaque(cividis((v + 2.0) / 6.0));
+        let color = Rgba::opaque(viridis((v + 2.0) / 6.0));
         let on_line = |level: f64, wide: bool| {
             (x + 1 < n && crosses(i, i + 1, level))
                 || (y + 1 < n && crosses(i, i + n, level))
@@ -363,11 +423,16 @@ mod tests {
             .iter()
             .map(|d| if d.z > 0.5 { 4.0 } else { -2.0 })
             .collect();
-        let raster = disc(&grid, &log, 1.0, 200, [99.0, 99.0], &[]);
+        let raster = paint(
+            200,
+            [99.0, 99.0],
+            &log,
+            &Panel::Disc(View::Top).pixels(&grid, 200),
+        );
         let bright = raster
             .rgba
             .chunks(4)
-            .filter(|p| p[3] == 255 && p[0] > 128)
+            .filter(|p| p[3] == 255 && p[0] > 160)
             .count() as f64;
         let all = raster.rgba.chunks(4).filter(|p| p[3] == 255).count() as f64;
         assert!((bright / all - 0.5).abs() < 0.01, "{}", bright / all);
@@ -378,10 +443,10 @@ mod tests {
         let grid = Icosphere::new(4);
         let log: Vec<f64> = grid.directions().iter().map(|d| 4.0 * d.x).collect();
         let middle = |view: View| {
-            let raster = shell(&grid, &log, view, 33, [99.0, 99.0]);
+            let raster = paint(33, [99.0, 99.0], &log, &Panel::View(view).pixels(&grid, 33));
             raster.rgba[4 * (16 * 33 + 16)]
         };
-        assert!(middle(View::Front) > 240 && middle(View::Back) == 0);
+        assert!(middle(View::Front) > 240 && middle(View::Back) < 80);
     }
 
     #[test]

@@ -19,16 +19,18 @@ impl Tally {
         self.skipped.values().sum()
     }
 
-    /// Adds the summaries of `cargo nextest` and of `cargo test`.
+    /// Adds the summary of `cargo nextest`, or else those of `cargo test`. (Below nextest each test prints a summary of
+    /// itself, which must not count again.)
     pub fn read_results(&mut self, text: &str) {
+        let nextest = text.lines().any(|line| line.trim().starts_with("Summary ["));
         for line in text.lines() {
             let line = line.trim();
             let counts = match (line.strip_prefix("Summary"), line.strip_prefix("test result:")) {
-                (Some(rest), _) => rest
+                (Some(rest), _) if nextest => rest
                     .split_once("tests run:")
                     .or_else(|| rest.split_once("test run:"))
                     .map(|s| s.1),
-                (_, Some(rest)) => rest.split_once('.').map(|s| s.1),
+                (_, Some(rest)) if !nextest => rest.split_once('.').map(|s| s.1),
                 _ => None,
             };
             let Some(counts) = counts else { continue };
@@ -72,14 +74,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn summaries_of_both_runners_add_up() {
+    fn summaries_of_cargo_test_add_up() {
+        let mut tally = Tally::default();
+        let line = |n| {
+            format!("test result: FAILED. {n} passed; 1 failed; 1 ignored; 0 measured; finished in 0.01s\n")
+        };
+        tally.read_results(&(line(5) + "Summary of nothing\n" + &line(7)));
+        assert_eq!((tally.passed, tally.failed, tally.n_skipped()), (12, 2, 2));
+    }
+
+    #[test]
+    fn below_nextest_only_its_own_summary_counts() {
         let mut tally = Tally::default();
         tally.read_results(
-            "     Summary [   3.412s] 12 tests run: 10 passed (1 slow), 2 failed, 3 skipped\n\
-             test result: ok. 5 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s\n\
-             Summary of nothing\n",
+            "    test result: ok. 1 passed; 0 failed; 0 ignored; 0 measured; 21 filtered out\n     \
+             Summary [   3.412s] 12 tests run: 10 passed (1 slow), 2 failed, 3 skipped\n",
         );
-        assert_eq!((tally.passed, tally.failed, tally.n_skipped()), (15, 2, 4));
+        assert_eq!((tally.passed, tally.failed, tally.n_skipped()), (10, 2, 3));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::figure::{Anchor, Figure, Pen, slug};
 use crate::page::Sheet;
-use crate::palette::{INK, MUTED, cividis};
+use crate::palette::{INK, MUTED, css_gradient, viridis};
 use crate::sections::account::{Account, absent};
 use crate::sphere_sheet::{DISC_TITLES, SphereSheet};
 use crate::view::View;
@@ -82,7 +82,7 @@ fn object(network: &str, maps: &ObjectMaps, out: &mut Sheet) -> Markup {
             figcaption {
                 strong { (maps.object) " (" (maps.object_type) "), network " (network) }
                 ": density of the hand's position on the sphere around the object, one row a task, relative to the uniform density. "
-                "Seen from six sides, then as equal-area discs of the upper and the lower half."
+                "Seen from six sides, then as equal-area discs of the upper and the lower half. Lines enclose the densest half and nine tenths of the probability; dots are labelled grasps."
             }
         }
         details {
@@ -109,12 +109,9 @@ fn percent(x: f64) -> String {
 /// The colour scale as a row of steps with its ticks.
 fn scale() -> Markup {
     html! {
-        div.scale role="img" aria-label="Colour scale: density over uniform, from one quarter (dark blue) over 1 to 16 (yellow), logarithmic." {
+        div.scale role="img" aria-label="Colour scale: density over uniform, from one quarter (violet) over 1 to 16 (yellow), logarithmic." {
             span { "¼" }
-            @for i in 0..24 {
-                @let [r, g, b] = cividis(f64::from(i) / 23.0);
-                i style=(format!("background:#{r:02x}{g:02x}{b:02x}")) {}
-            }
+            i style={ "background:" (css_gradient()) } {}
             span { "16 × uniform" }
         }
     }
@@ -149,7 +146,7 @@ fn as_file(network: &str, maps: &ObjectMaps) -> Figure {
     }
     let y = height - 22.0;
     for i in 0..48 {
-        let [r, g, b] = cividis(f64::from(i) / 47.0);
+        let [r, g, b] = viridis(f64::from(i) / 47.0);
         pen.rect(
             [left + f64::from(i) * 5.0, y, 5.2, 10.0],
             &format!("#{r:02x}{g:02x}{b:02x}"),

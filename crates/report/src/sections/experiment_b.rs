@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::figure::{Anchor, Figure, Pen, slug};
 use crate::page::Sheet;
-use crate::palette::{ACCENT, INK, MUTED, ON_ACCENT, RULE};
+use crate::palette::{INK, MUTED, RULE, SHADE, SHADE_MOST};
 use crate::sections::account::{Account, absent};
 use crate::wilson::wilson_interval;
 
@@ -185,22 +185,21 @@ fn draw(result: &Confusions, matrix: &Confusion, tasks: &[String]) -> Figure {
             let (x, y) = (left + p as f64 * cell, top + t as f64 * cell);
             pen.rect(
                 [x + 1.0, y + 1.0, cell - 2.0, cell - 2.0],
-                ACCENT,
-                0.04 + 0.86 * share,
+                SHADE,
+                0.03 + (SHADE_MOST - 0.03) * share,
             );
-            let ink = if share > 0.55 { ON_ACCENT } else { INK };
             pen.bold(
                 [x + cell / 2.0, y + 28.0],
                 Anchor::Middle,
                 15.0,
-                ink,
+                INK,
                 &format!("{:.0}", share * 100.0),
             );
             pen.text(
                 [x + cell / 2.0, y + 44.0],
                 Anchor::Middle,
                 10.0,
-                ink,
+                INK,
                 &count.to_string(),
             );
         }

@@ -151,7 +151,7 @@ fn posterior(name: &str, run: &ImitationRun, tasks: &[String]) -> Figure {
 /// Pictures over two rows of bars from 0 to 1, one column a candidate: probability, and similarity on its own axis.
 /// Pictures inside are why this is not the chart crate's bar plot.
 fn candidates(name: &str, candidates: &[Candidate], p_label: &str) -> Figure {
-    let (left, column, picture, bar) = (96.0, 108.0, 96.0, 70.0);
+    let (left, column, picture, bar) = (150.0, 108.0, 96.0, 70.0);
     let with_similarity = candidates.iter().any(|c| c.similarity.is_some());
     let bars_top = picture + 40.0;
     let height = bars_top + bar + 12.0 + if with_similarity { bar + 26.0 } else { 0.0 };

@@ -219,10 +219,15 @@ fn rules(rows: &[Rule], out: &Sheet) -> Markup {
             thead { tr { th { "Task" } th { "Rule" } th.n { "Decided" } th { "Nearest feature" } th.n { "Correlation" } } }
             tbody { @for row in rows { tr {
                 td { (out.task(&row.task)) } td { (row.rule) } td.n { (row.decided) }
-                td { code { (row.feature) } } td.n { (format!("{:+.2}", row.correlation)) }
+                td { code { (row.feature) } } td.n { (signed(row.correlation)) }
             } } }
         } }
     }
+}
+
+/// A signed number with a true minus.
+fn signed(x: f64) -> String {
+    format!("{x:+.2}").replace('-', "−")
 }
 
 #[cfg(test)]

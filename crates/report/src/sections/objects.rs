@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use crate::compositions::PARTS_LEGEND;
 use crate::page::Sheet;
 use crate::picture::Picture;
 
@@ -64,6 +65,7 @@ pub(crate) fn render(objects: &[ObjectSection], out: &mut Sheet) -> Markup {
             @for (i, task) in out.tasks.to_vec().iter().enumerate() { @if i > 0 { ", " } (out.task(task)) }
             "; – for none) and its ε. Sizes are those of the root box; "
             "cvex is its volume over the sum of the boxes' volumes."
+            @if objects.iter().any(|o| !o.parts.is_empty()) { " The second picture of an object shows its directions and parts (" (PARTS_LEGEND) "); what was guessed rather than given is listed as such." }
         }
         @if objects.is_empty() { p.muted { "No objects were in this run." } }
         @for (i, object) in objects.iter().enumerate() {
@@ -78,7 +80,7 @@ pub(crate) fn render(objects: &[ObjectSection], out: &mut Sheet) -> Markup {
                     }
                     div.pictures {
                         (out.picture(&object.boxes, 220))
-                        @if !object.parts.is_empty() { (out.picture(&object.parts, 220)) }
+                        @if !object.parts.is_empty() { (out.picture(&object.parts, 180)) }
                     }
                     @if !object.notes.is_empty() || !object.guesses.is_empty() {
                         ul.notes {

@@ -33,16 +33,24 @@ pub(crate) fn render(summary: &Summary, out: &mut Sheet) -> Markup {
     html! {
         section #summary aria-label="Summary" {
             div.lead {
-                div.sentences { @for sentence in &summary.sentences { p { (sentence) } } }
+                div.sentences {
+                    @for sentence in &summary.sentences { p { (sentence) } }
+                    (numbers(&summary.numbers))
+                }
                 @if !summary.picture.is_empty() {
                     figure { (out.picture(&summary.picture, 400)) figcaption { (summary.caption) } }
                 }
             }
-            @if !summary.numbers.is_empty() {
-                dl.numbers {
-                    @for number in &summary.numbers {
-                        div { dt { (number.label) } dd { strong { (number.value) } span.muted { (number.detail) } } }
-                    }
+        }
+    }
+}
+
+fn numbers(numbers: &[KeyNumber]) -> Markup {
+    html! {
+        @if !numbers.is_empty() {
+            dl.numbers {
+                @for number in numbers {
+                    div { dt { (number.label) } dd { strong { (number.value) } span.muted { (number.detail) } } }
                 }
             }
         }

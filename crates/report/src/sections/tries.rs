@@ -59,9 +59,21 @@ fn chart(hand: &str, rows: &[&TriesRow], out: &mut Sheet) -> Markup {
     let figure = bars(&format!("tries-{}", slug(hand)), &alt, "tries", &list);
     out.figure(
         &figure,
-        &html! { strong { (hand) } ": what became of " (tried) " tries on " (rows.len()) " objects. "
-        (kept) " (" (format!("{share:.1}")) " %) were kept; the grey bars count the others by the first reason that ruled them out." },
+        &html! { strong { (hand) } ": what became of " (grouped(tried)) " tries on " (rows.len()) " objects. "
+        (grouped(kept)) " (" (format!("{share:.1}")) " %) were kept; the grey bars count the others by the first reason that ruled them out." },
     )
+}
+
+/// A count with commas between thousands.
+fn grouped(n: usize) -> String {
+    let digits = n.to_string();
+    let groups: Vec<&str> = digits
+        .as_bytes()
+        .rchunks(3)
+        .rev()
+        .map(|g| std::str::from_utf8(g).unwrap_or_default())
+        .collect();
+    groups.join(",")
 }
 
 fn totals<'a>(rows: &[&'a TriesRow]) -> BTreeMap<&'a str, usize> {
@@ -87,5 +99,18 @@ fn table(hand: &str, rows: &[&TriesRow]) -> Markup {
                 } } }
             } }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_grouped_by_thousands() {
+        assert_eq!(
+            [0, 999, 1000, 1_234_567].map(grouped),
+            ["0", "999", "1,000", "1,234,567"]
+        );
     }
 }

@@ -1,0 +1,293 @@
+//! Laws of answers, the formats, and errors that help.
+
+use prehend_model::{Evidence, Model, ModelError, Observation};
+use serde_json::{Value, json};
+
+/// The example of docs/model-format.md.
+const EXAMPLE: &str = r#"{ "format": "prehend-model", "version": 1,
+  "nodes": [
+    { "name": "task", "kind": "discrete", "states": ["hand-over", "pouring"], "parents": [], "table": [[0.4, 0.6]] },
+    { "name": "size", "kind": "gaussian_mixture", "columns": ["size_x", "size_y"],
+      "discrete_parents": ["task"], "continuous_parents": [],
+      "components": [
+        [ { "weight": 1.0, "mean": [0.1, 0.2], "coefficients": [[], []], "covariance": [[1.0, 0.0], [0.0, 1.0]] } ],
+        [ { "weight": 0.3, "mean": [0.0, 0.0], "coefficients": [[], []], "covariance": [[1.0, 0.0], [0.0, 1.0]] },
+          { "weight": 0.7, "mean": [2.0, 1.0], "coefficients": [[], []], "covariance": [[0.5, 0.1], [0.1, 0.5]] } ] ] } ] }"#;
+
+fn example() -> Model {
+    Model::from_json(EXAMPLE).unwrap()
+}
+
+fn oracle_model() -> Model {
+    let oracle: Value = serde_json::from_str(include_str!("oracle/inference.json")).unwrap();
+    Model::from_json(&oracle["model"].to_string()).unwrap()
+}
+
+fn normal(x: [f64; 2], mean: [f64; 2], covariance: [[f64; 2]; 2]) -> f64 {
+    let [[a, b], [_, d]] = covariance;
+    let det = a * d - b * b;
+    let (u, v) = (x[0] - mean[0], x[1] - mean[1]);
+    (-0.5 * (d * u * u - 2.0 * b * u * v + a * v * v) / det).exp() / (2.0 * std::f64::consts::PI * det.sqrt())
+}
+
+#[test]
+fn a_hand_written_model_answers_as_bayes_rule_says() {
+    let model = example();
+    let x = [1.0, 0.5];
+    let unit = [[1.0, 0.0], [0.0, 1.0]];
+    let hand_over = 0.4 * normal(x, [0.1, 0.2], unit);
+    let pouring =
+        0.6 * (0.3 * normal(x, [0.0, 0.0], unit) + 0.7 * normal(x, [2.0, 1.0], [[0.5, 0.1], [0.1, 0.5]]));
+    let evidence = Evidence::from_json(&model, &json!({ "size": x })).unwrap();
+    let answer = model.posterior(&["task"], &evidence).unwrap().to_json().unwrap();
+    let p = answer["posterior"]["pouring"].as_f64().unwrap();
+    assert!((p - pouring / (pouring + hand_over)).abs() < 1e-12);
+    assert!((answer["log_evidence"].as_f64().unwrap() - (pouring + hand_over).ln()).abs() < 1e-12);
+    let sizes = model.posterior(
+        &["size"],
+        &Evidence::from_json(&model, &json!({ "task": "pouring" })).unwrap(),
+    );
+    let sizes = sizes.unwrap().to_json_at(&[x.to_vec()]).unwrap();
+    assert_eq!(sizes["components"].as_array().unwrap().len(), 2);
+    assert!((sizes["mean"][0].as_f64().unwrap() - 1.4).abs() < 1e-12);
+    assert!((sizes["log_density"][0].as_f64().unwrap() - (pouring / 0.6).ln()).abs() < 1e-12);
+}
+
+#[test]
+fn the_sprinkler_is_explained_away() {
+    let sprinkler = Model::from_json(
+        r#"{ "format": "prehend-model", "version": 1, "nodes": [
+        { "name": "wet", "kind": "discrete", "states": ["no", "yes"], "parents": ["sprinkler", "rain"],
+          "table": [[1.0, 0.0], [0.2, 0.8], [0.1, 0.9], [0.01, 0.99]] },
+        { "name": "rain", "kind": "discrete", "states": ["no", "yes"], "parents": [], "table": [[0.8, 0.2]] },
+        { "name": "sprinkler", "kind": "discrete", "states": ["off", "on"], "parents": ["rain"],
+          "table": [[0.6, 0.4], [0.99, 0.01]] } ] }"#,
+    )
+    .unwrap();
+    let wet = Evidence::new().with_state(&sprinkler, "wet", "yes").unwrap();
+    let rain = sprinkler
+        .posterior(&["rain"], &wet)
+        .unwrap()
+        .posterior("rain")
+        .unwrap()[1];
+    // 0.2 (0.01 · 0.99 + 0.99 · 0.8) / (that + 0.8 · 0.4 · 0.9): the textbook's 35.77 %.
+    assert!((rain - 0.16038 / 0.44838).abs() < 1e-12);
+    let both = sprinkler
+        .posterior(&["rain", "sprinkler"], &wet)
+        .unwrap()
+        .to_json()
+        .unwrap();
+    assert_eq!(both["joint"].as_array().unwrap().len(), 3);
+    let story = sprinkler.most_probable(&wet).unwrap();
+    assert_eq!(
+        story.states,
+        [("rain".into(), "no".into()), ("sprinkler".into(), "on".into())]
+    );
+}
+
+#[test]
+fn the_order_of_evidence_does_not_matter() {
+    let model = oracle_model();
+    let there = Evidence::new().with_value(&model, "size", &[0.1, 0.2]).unwrap();
+    let there = there.with_value(&model, "egpc", &[0.3, f64::NAN]).unwrap();
+    let back = Evidence::new()
+        .with_value(&model, "egpc", &[0.3, f64::NAN])
+        .unwrap();
+    let back = back.with_value(&model, "size", &[0.1, 0.2]).unwrap();
+    assert_eq!(
+        model.posterior(&["task"], &there).unwrap(),
+        model.posterior(&["task"], &back).unwrap()
+    );
+}
+
+#[test]
+fn densities_integrate_to_one() {
+    let model = oracle_model();
+    let evidence = Evidence::from_json(&model, &json!({ "task": "pouring", "size": [0.3, null] })).unwrap();
+    for (name, step) in [("qeps", 0.01), ("fvol", 0.01)] {
+        let mixture = model
+            .posterior(&[name], &evidence)
+            .unwrap()
+            .mixture(name)
+            .unwrap();
+        prehend_testkit::integrates_to_one_on_line(|x| mixture.log_density(&[x]).unwrap(), -20.0, 20.0, step);
+    }
+    let upos = model
+        .posterior(&["upos"], &evidence)
+        .unwrap()
+        .mixture("upos")
+        .unwrap();
+    let normalizer = upos.log_sphere_normalizer().unwrap();
+    prehend_testkit::integrates_to_one_on_sphere(|x| upos.log_density(&x).unwrap() - normalizer, 200);
+}
+
+#[test]
+fn evidence_sixty_deviations_out_still_has_an_answer() {
+    let model = oracle_model();
+    let evidence = Evidence::from_json(
+        &model,
+        &json!({ "upos": [60.0, 0.0, -60.0], "size": [50.0, 1.0] }),
+    )
+    .unwrap();
+    let answer = model.posterior(&["task"], &evidence).unwrap();
+    assert!(answer.log_evidence < -1000.0 && answer.log_evidence.is_finite());
+    assert!((answer.posterior("task").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_flat_component_is_legal_until_the_evidence_needs_its_density() {
+    let flat = EXAMPLE.replace("[[0.5, 0.1], [0.1, 0.5]]", "[[0.5, 0.5], [0.5, 0.5]]");
+    let model = Model::from_json(&flat).unwrap();
+    assert!(model.posterior(&["size"], &Evidence::new()).is_ok());
+    let error = model.posterior(
+        &["task"],
+        &Evidence::new().with_value(&model, "size", &[0.0, 0.0]).unwrap(),
+    );
+    let expected = ModelError::NoDensity {
+        node: "size".into(),
+        configuration: 1,
+        component: 1,
+    };
+    assert_eq!(error.unwrap_err(), expected);
+    // One dimension of it has a density, and so has a noisy measurement.
+    assert!(
+        model
+            .posterior(
+                &["task"],
+                &Evidence::from_json(&model, &json!({ "size": [0.0, null] })).unwrap()
+            )
+            .is_ok()
+    );
+    let noisy = json!({ "size": { "mean": [0.0, 0.0], "covariance": [[0.1, 0.0], [0.0, 0.1]] } });
+    assert!(
+        model
+            .posterior(&["task"], &Evidence::from_json(&model, &noisy).unwrap())
+            .is_ok()
+    );
+}
+
+#[test]
+fn contributions_add_up_to_the_posterior_odds() {
+    let model = oracle_model();
+    let evidence =
+        Evidence::from_json(&model, &json!({ "size": [0.3, -0.2], "upos": [0.2, -0.5, 0.3] })).unwrap();
+    let explanation = model.explain("task", &evidence).unwrap();
+    let posterior = model
+        .posterior(&["task"], &evidence)
+        .unwrap()
+        .posterior("task")
+        .unwrap();
+    let states = ["hand-over", "pouring", "tool-use"];
+    let p = |state: &str| posterior[states.iter().position(|s| *s == state).unwrap()];
+    assert_eq!(explanation.against.len(), 2);
+    for contrast in &explanation.against {
+        let sum: f64 = contrast.prior + contrast.contributions.iter().map(|(_, nats)| nats).sum::<f64>();
+        assert!((sum - (p(&explanation.state) / p(&contrast.other)).ln()).abs() < 1e-9);
+        assert_eq!(
+            contrast
+                .contributions
+                .iter()
+                .map(|(node, _)| node.as_str())
+                .collect::<Vec<_>>(),
+            ["size", "upos"]
+        );
+    }
+}
+
+#[test]
+fn a_prior_can_be_replaced() {
+    let model = example();
+    let certain = model
+        .with_priors_json(&json!({ "task": { "pouring": 2.0 } }))
+        .unwrap();
+    let answer = certain.posterior(&["task"], &Evidence::new()).unwrap();
+    assert_eq!(answer.posterior("task").unwrap(), [0.0, 1.0]);
+    let uniform = model.with_priors_json(&json!("uniform")).unwrap();
+    assert_eq!(
+        uniform
+            .posterior(&["task"], &Evidence::new())
+            .unwrap()
+            .posterior("task")
+            .unwrap(),
+        [0.5, 0.5]
+    );
+}
+
+#[test]
+fn json_and_bytes_lose_nothing() {
+    for mut model in [example(), oracle_model()] {
+        model = model.with_extra("provenance", json!({ "seed": 7, "third": 1.0 / 3.0 }));
+        let text = model.to_json();
+        assert_eq!(Model::from_json(&text).unwrap(), model);
+        let bytes = model.to_bytes();
+        let again = Model::from_bytes(&bytes).unwrap();
+        assert_eq!(again, model);
+        assert_eq!(again.to_json(), text);
+        assert_eq!(Model::from_json(&text).unwrap().to_bytes(), bytes);
+    }
+}
+
+#[test]
+fn a_damaged_binary_model_is_refused() {
+    let bytes = example().to_bytes();
+    let message = |bytes: &[u8]| Model::from_bytes(bytes).unwrap_err().to_string();
+    assert!(message(b"hello").contains("expected the header PREHENDM"));
+    assert!(message(&bytes[..bytes.len() - 1]).contains("the file is cut off"));
+    let mut flipped = bytes.clone();
+    let last = flipped.len() - 1;
+    flipped[last] ^= 1;
+    assert!(message(&flipped).contains("the file is damaged"));
+}
+
+#[test]
+fn a_wrong_model_file_says_where() {
+    let message = |from: &str, to: &str| {
+        let text = EXAMPLE.replace(from, to);
+        assert_ne!(text, EXAMPLE);
+        Model::from_json(&text).unwrap_err().to_string()
+    };
+    assert_eq!(
+        message("\"prehend-model\"", "\"bif\""),
+        "model file, `format`: found \"bif\", expected \"prehend-model\""
+    );
+    assert_eq!(
+        message("[[0.4, 0.6]]", "[[0.4, 0.7]]"),
+        "`task`: table row 0 is [0.4, 0.7] (sum 1.1); expected 2 probabilities that sum to 1"
+    );
+    assert!(
+        message("[[0.5, 0.1], [0.1, 0.5]]", "[[0.5, 0.9], [0.9, 0.5]]")
+            .starts_with("`size`: configuration 1, component 1: `covariance` has the negative eigenvalue")
+    );
+    assert_eq!(
+        message("\"mean\": [2.0, 1.0]", "\"mean\": [2.0]"),
+        "`size`: configuration 1, component 1: `mean` has 1 entries; expected 2, one per column"
+    );
+    assert!(message("\"weight\": 0.7,", "").starts_with("model file, node `size`: missing field `weight`"));
+    assert!(
+        message("[\"task\"]", "[\"tusk\"]")
+            .starts_with("`size` names the parent `tusk`, which is not a node")
+    );
+}
+
+#[test]
+fn wrong_evidence_says_what_would_do() {
+    let model = example();
+    let message = |json: Value| Evidence::from_json(&model, &json).unwrap_err().to_string();
+    assert_eq!(
+        message(json!({ "colour": 1 })),
+        "the model has no node `colour`; its nodes are `task`, `size`"
+    );
+    assert_eq!(
+        message(json!({ "task": "juggling" })),
+        "`task`: found \"juggling\", expected one of `hand-over`, `pouring`, or an index from 0 to 1"
+    );
+    assert!(message(json!({ "size": [1.0] })).contains("expected 2 finite numbers or nulls"));
+    assert!(message(json!({ "size": "big" })).contains("expected an array of 2 numbers or nulls"));
+    let twice = model.posterior(&["task", "task"], &Evidence::new()).unwrap_err();
+    assert_eq!(
+        twice.to_string(),
+        "`task`: found the same target twice, expected each target once"
+    );
+    let none = Evidence::new().with(&model, "task", Observation::Likelihood(vec![0.0, 0.0]));
+    assert!(none.is_err());
+}
