@@ -1,90 +1,44 @@
-//! A report on made-up numbers: `cargo run -p prehend-report --example sample_report -- index.html` writes it, without an
-//! argument its size is printed.
+//! A page with confusion matrices of made-up counts. `cargo run -p prehend-report --example sample_report -- index.html`
+//! writes it.
 
-use std::sync::Arc;
+use prehend_report::{Confusion, Confusions, ExperimentB, ReportData, paper_recall, render_page};
 
-use nalgebra::Point3;
-use prehend_geometry::{OrientedBox, Solid};
-use prehend_report::{
-    Confusion, Confusions, DisplayMesh, ExperimentA, ExperimentB, Icosphere, NetworkMaps, ObjectMaps,
-    ObjectSection, ReportData, Scene, SphereMap, Summary, View, paper_recall, render_page, sphere_sheet,
-};
+const TASKS: [&str; 3] = ["hand-over", "pouring", "tool-use"];
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let tasks = ["hand-over", "pouring", "tool-use"];
-    let can = Arc::new(DisplayMesh::new(
-        &Solid::Cylinder {
-            half_length: 0.06,
-            radius: 0.03,
-        }
-        .display_mesh(),
-    ));
-    let in_box = Scene::boxes(&can, &[OrientedBox::centered([0.06, 0.06, 0.12])]);
-
-    // A map a task: the hand comes from the side, the more so the later the task.
-    let grid = Icosphere::new(4);
-    let map = |(i, task): (usize, &&str)| {
-        let log: Vec<f64> = grid
-            .directions()
-            .iter()
-            .map(|d| -2.0 * i as f64 * d.z * d.z)
-            .collect();
-        SphereMap {
-            task: (*task).into(),
-            density: grid.normalized(&log),
-            marks: vec![],
-        }
-    };
-    let maps: Vec<SphereMap> = tasks.iter().enumerate().map(map).collect();
-    let sheet = sphere_sheet(&can, &Point3::origin(), &grid, &maps, 112)?;
-    println!(
-        "densest direction of {}: {:.1} times uniform",
-        tasks[2], sheet.rows[2].peak
-    );
-
-    let evidence = ["O", "O, A", "O, A, C"];
-    let matrix = |evidence: &str| Confusion {
+fn matrix(evidence: &str, right: usize) -> Confusion {
+    let wrong = (100 - right) / 2;
+    let row = |t: usize| (0..3).map(|p| if p == t { right } else { wrong }).collect();
+    Confusion {
         evidence: evidence.into(),
-        counts: vec![vec![56, 24, 20], vec![12, 78, 10], vec![10, 15, 75]],
-        paper: tasks.iter().map(|task| paper_recall(evidence, task)).collect(),
-    };
-    let confusions = Confusions {
+        counts: (0..3).map(row).collect(),
+        paper: TASKS.iter().map(|task| paper_recall(evidence, task)).collect(),
+    }
+}
+
+fn main() -> std::io::Result<()> {
+    let result = Confusions {
         hand: "made up".into(),
-        network: "paper".into(),
+        network: "made up".into(),
         ceiling: Some(0.85),
-        matrices: evidence.map(matrix).to_vec(),
+        matrices: vec![matrix("O", 60), matrix("O, A", 70), matrix("O, A, C", 80)],
     };
-    let objects = vec![ObjectMaps {
-        object: "can".into(),
-        object_type: "cylinder".into(),
-        sheet,
-    }];
+    for matrix in &result.matrices {
+        let recall = matrix.mean_recall().unwrap_or(f64::NAN);
+        println!("given {}: mean recall {recall:.2}", matrix.evidence);
+    }
     let page = render_page(&ReportData {
-        tasks: tasks.map(String::from).to_vec(),
-        summary: Summary {
-            sentences: vec!["Nothing here was measured.".into()],
-            ..Summary::default()
-        },
-        objects: vec![ObjectSection {
-            name: "can".into(),
-            object_type: "cylinder".into(),
-            boxes: in_box.picture(View::Oblique, 360, "can", "A cylinder in its box.")?,
-            ..ObjectSection::default()
-        }],
-        experiment_a: Some(ExperimentA {
-            networks: vec![NetworkMaps {
-                network: "paper".into(),
-                objects,
-            }],
-            ..Default::default()
-        }),
+        title: "Nothing here was measured".into(),
+        tasks: TASKS.map(String::from).to_vec(),
         experiment_b: Some(ExperimentB {
-            results: vec![confusions],
-            ..Default::default()
+            results: vec![result],
+            ..ExperimentB::default()
         }),
         ..ReportData::default()
     });
-    println!("{} kB, {} figures", page.html.len() / 1000, page.figures.len());
+    println!("{} figures stand beside the page:", page.figures.len());
+    for (name, bytes) in &page.figures {
+        println!("{name}, {} bytes", bytes.len());
+    }
     if let Some(path) = std::env::args().nth(1) {
         std::fs::write(path, page.html)?;
     }

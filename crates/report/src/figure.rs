@@ -23,10 +23,11 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// The figure inside the page: it follows the page's theme and shrinks with a narrow screen.
+    /// The figure inside the page: it follows the page's theme and shrinks with a narrow screen, down to six tenths,
+    /// at which its text is still readable.
     pub(crate) fn inline(&self) -> Markup {
         html! {
-            div.figure role="img" aria-label=(self.alt) style=(format!("max-width:{}px", self.width)) {
+            div.figure role="img" aria-label=(self.alt) style=(format!("max-width:{:.0}px;min-width:{:.0}px", self.width, 0.6 * self.width)) {
                 (PreEscaped(follow_theme(&self.svg)))
             }
         }

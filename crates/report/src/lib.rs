@@ -53,6 +53,7 @@ mod picture;
 mod raster;
 mod scene;
 mod sections;
+mod sphere_panel;
 mod sphere_sheet;
 mod view;
 mod wilson;

@@ -57,11 +57,12 @@ pub struct Candidate {
     pub total: Option<f64>,
 }
 
-const QUESTION: &str = "A person pours from a mug. What does the robot hand take for it to be, which of six objects does it choose, and how does it \
-    grasp the one it chose?";
-const PROTOCOL: &str = "Both networks are trained without the seven objects of this experiment. Step 1 reads the demonstrator's P(T | o, a, c) of the \
-    shown grasp and takes its largest as t̂. Step 2.1 ranks the six objects by the imitator's P(t̂ | o), step 2.2 the grasps on the chosen one by P(t̂ | o, a, c). \
-    Beside them stand the joint argmax over all grasps on all objects (Eq. 3) and the same with similarity (Eq. 5).";
+const QUESTION: &str = "One hand shows a grasp. For which task does the other take it, which object does it choose for that \
+    task, and how does it grasp the one it chose?";
+const PROTOCOL: &str = "Both networks are trained without the objects of this experiment. Step 1 reads the demonstrator's \
+    P(T | o, a, c) of the shown grasp and takes its largest as t̂. Step 2.1 ranks the objects by the imitator's P(t̂ | o), step \
+    2.2 the grasps on the chosen one by P(t̂ | o, a, c). Beside them stand the joint argmax over all grasps on all objects \
+    (Eq. 3) and the same with similarity (Eq. 5).";
 
 pub(crate) fn render(experiment: Option<&ExperimentC>, out: &mut Sheet) -> Markup {
     let Some(experiment) = experiment else {
