@@ -1,0 +1,167 @@
+//! Reading and writing whole files. A file under its final name is always complete.
+
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::Error;
+
+/// The bytes of a file, or of standard input where the path is `-`.
+///
+/// # Errors
+///
+/// [`Error::File`] with what the system said.
+pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        std::io::stdin()
+            .read_to_end(&mut bytes)
+            .map_err(|e| Error::file(path, e))?;
+        return Ok(bytes);
+    }
+    fs::read(path).map_err(|e| {
+        let hint = if e.kind() == std::io::ErrorKind::NotFound {
+            "; check the path"
+        } else {
+            ""
+        };
+        Error::file(path, format!("{e}{hint}"))
+    })
+}
+
+/// The text of a file.
+///
+/// # Errors
+///
+/// [`Error::File`], also where the bytes are not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    String::from_utf8(read(path)?).map_err(|e| {
+        Error::file(
+            path,
+            format!(
+                "byte {} is not UTF-8 text; save the file as UTF-8",
+                e.utf8_error().valid_up_to()
+            ),
+        )
+    })
+}
+
+/// Writes a file so that a reader sees the old content or the new one, never a part: beside it, synced, then renamed.
+///
+/// # Errors
+///
+/// [`Error::File`]; the old file, if any, is then untouched.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
+    let name = path
+        .file_name()
+        .ok_or_else(|| Error::file(path, "is no file name; give a file to write"))?;
+    let beside = folder.join(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
+    let result = (|| {
+        let mut file = File::create(&beside)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&beside, path)?;
+        File::open(folder)?.sync_all()
+    })();
+    result.map_err(|e| {
+        let _ = fs::remove_file(&beside);
+        Error::file(path, e)
+    })
+}
+
+/// Every file below `folder` with one of the extensions (lower case), sorted by path; a file is its own answer.
+///
+/// # Errors
+///
+/// [`Error::File`] where a folder cannot be listed.
+pub fn list(folder: &Path, extensions: &[&str]) -> Result<Vec<PathBuf>, Error> {
+    fn visit(path: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> Result<(), Error> {
+        let entries = fs::read_dir(path).map_err(|e| Error::file(path, e))?;
+        for entry in entries {
+            let entry = entry.map_err(|e| Error::file(path, e))?.path();
+            if entry.is_dir() {
+                visit(&entry, extensions, found)?;
+            } else if extension(&entry).is_some_and(|e| extensions.contains(&e.as_str())) {
+                found.push(entry);
+            }
+        }
+        Ok(())
+    }
+    if folder.is_file() {
+        return Ok(vec![folder.to_owned()]);
+    }
+    let mut found = Vec::new();
+    visit(folder, extensions, &mut found)?;
+    found.sort();
+    Ok(found)
+}
+
+/// A path's extension in lower case.
+pub fn extension(path: &Path) -> Option<String> {
+    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+}
+
+/// A name for what went into a result: equal inputs give equal fingerprints, so a finished stage is not run again.
+#[derive(Clone)]
+pub struct Fingerprint(Sha256);
+
+impl Fingerprint {
+    /// Starts a fingerprint for one stage; the program's version is part of it.
+    pub fn of_stage(stage: &str) -> Self {
+        Self(Sha256::new())
+            .with(stage.as_bytes())
+            .with(env!("CARGO_PKG_VERSION").as_bytes())
+    }
+
+    /// Adds one input.
+    #[must_use]
+    pub fn with(mut self, bytes: &[u8]) -> Self {
+        self.0.update((bytes.len() as u64).to_le_bytes());
+        self.0.update(bytes);
+        self
+    }
+
+    /// Sixteen hexadecimal digits.
+    pub fn finish(self) -> String {
+        self.0
+            .finalize()
+            .iter()
+            .take(8)
+            .map(|b| format!("{b:02x}"))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        write(&path, b"old").unwrap();
+        assert!(write(&path.join("below"), b"new").is_err());
+        assert_eq!(read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_fingerprint_depends_on_where_one_input_ends() {
+        let joined = |parts: [&str; 2]| {
+            parts
+                .iter()
+                .fold(Fingerprint::of_stage("x"), |f, p| f.with(p.as_bytes()))
+                .finish()
+        };
+        assert_ne!(joined(["ab", "c"]), joined(["a", "bc"]));
+        assert_eq!(joined(["ab", "c"]), joined(["ab", "c"]));
+    }
+}

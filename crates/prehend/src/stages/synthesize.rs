@@ -1,0 +1,198 @@
+//! Hands meet objects: `grasps/HAND/OBJECT.parquet` and `OBJECT.rejected.json`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use prehend_grasp::{SynthesisOptions, synthesize};
+use prehend_hand::Hand;
+use serde::{Deserialize, Serialize};
+
+use super::decompose::Shape;
+use crate::files::{self, Fingerprint};
+use crate::frame::Frame;
+use crate::grasp_table::{TableContext, to_frame};
+use crate::progress::Watch;
+use crate::{Error, hand_folder};
+
+/// A hand and where it came from.
+pub struct HandData {
+    /// The hand.
+    pub hand: Hand,
+    /// Its folder as given.
+    pub path: String,
+    /// Equal where every file of the folder is equal.
+    pub fingerprint: String,
+}
+
+impl HandData {
+    /// Reads a hand that can grasp.
+    ///
+    /// # Errors
+    ///
+    /// As [`hand_folder::read_described_hand`].
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        let hand = hand_folder::read_described_hand(folder)?;
+        let mut print = Fingerprint::of_stage("hand");
+        for file in files::list(folder, &["toml", "urdf", "stl", "obj", "ply", "off"])? {
+            print = print.with(&files::read(&file)?);
+        }
+        Ok(Self {
+            hand,
+            path: folder.to_string_lossy().into_owned(),
+            fingerprint: print.finish(),
+        })
+    }
+}
+
+/// Where one hand's grasps on one object stand, and how the tries went.
+#[derive(Debug, Clone)]
+pub struct GraspFile {
+    /// The hand's name.
+    pub hand: String,
+    /// The object's name.
+    pub object: String,
+    /// The table.
+    pub path: PathBuf,
+    /// Fingerprint of the table's inputs.
+    pub fingerprint: String,
+    /// Tries by outcome.
+    pub tries: Tries,
+}
+
+/// How the tries went; what stands in `OBJECT.rejected.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tries {
+    /// All tries.
+    pub tried: usize,
+    /// Force-closure grasps.
+    pub kept: usize,
+    /// The rest, by reason.
+    pub rejected: BTreeMap<String, usize>,
+}
+
+/// Plans and closes `options.tries` grasps of each hand on each object, except where an earlier run did.
+///
+/// # Errors
+///
+/// A file that cannot be written, or [`Error::Stopped`].
+pub fn run(
+    hands: &[HandData],
+    shapes: &[Shape],
+    options: &BTreeMap<String, SynthesisOptions>,
+    out: &Path,
+    watch: Watch,
+) -> Result<Vec<GraspFile>, Error> {
+    let mut grasp_files = Vec::new();
+    for hand in hands {
+        let options = &options[hand.hand.name()];
+        watch.progress.begin(
+            &format!("grasp with {}", hand.hand.name()),
+            (options.tries * shapes.len()) as u64,
+        );
+        for shape in shapes {
+            watch.check()?;
+            grasp_files.push(one(hand, shape, options, out, watch)?);
+        }
+        watch.progress.end();
+    }
+    Ok(grasp_files)
+}
+
+fn one(
+    hand: &HandData,
+    shape: &Shape,
+    options: &SynthesisOptions,
+    out: &Path,
+    watch: Watch,
+) -> Result<GraspFile, Error> {
+    let object = &shape.object;
+    let folder = out.join("grasps").join(hand.hand.name());
+    let path = folder.join(format!("{}.parquet", object.name));
+    let tries_path = folder.join(format!("{}.rejected.json", object.name));
+    let fingerprint = Fingerprint::of_stage("synthesize")
+        .with(shape.fingerprint.as_bytes())
+        .with(hand.fingerprint.as_bytes())
+        .with(hand.path.as_bytes())
+        .with(object.path.to_string_lossy().as_bytes())
+        .with(format!("{options:?}").as_bytes())
+        .finish();
+    let known = Frame::read_metadata(&path)
+        .get("fingerprint")
+        .is_some_and(|f| *f == fingerprint);
+    let tries = files::read(&tries_path)
+        .ok()
+        .and_then(|b| serde_json::from_slice::<Tries>(&b).ok());
+    if let (true, Some(tries)) = (known, tries) {
+        watch.progress.advance(options.tries as u64);
+        return Ok(GraspFile {
+            hand: hand.hand.name().into(),
+            object: object.name.clone(),
+            path,
+            fingerprint,
+            tries,
+        });
+    }
+    let (mut frame, tries) = grasp(hand, shape, options, watch)?;
+    frame.metadata.insert("fingerprint".into(), fingerprint.clone());
+    // The table comes last: a run that was stopped between the two files does both again.
+    files::write(
+        &tries_path,
+        &serde_json::to_vec_pretty(&tries).map_err(Error::input)?,
+    )?;
+    frame.write(&path)?;
+    Ok(GraspFile {
+        hand: hand.hand.name().into(),
+        object: object.name.clone(),
+        path,
+        fingerprint,
+        tries,
+    })
+}
+
+/// Grasps of one hand on one object as a table, without an output folder.
+///
+/// # Errors
+///
+/// [`Error::Stopped`], or what the planner says of hand and object.
+pub fn grasp(
+    hand: &HandData,
+    shape: &Shape,
+    options: &SynthesisOptions,
+    watch: Watch,
+) -> Result<(Frame, Tries), Error> {
+    let grasp_object = shape.grasp_object()?;
+    let report = |_finished: usize| {
+        watch.progress.advance(1);
+        watch.check().is_ok()
+    };
+    let options = SynthesisOptions {
+        stream: stream(hand.hand.name(), &shape.object.name),
+        ..options.clone()
+    };
+    let synthesis = synthesize(&hand.hand, &grasp_object, &options, &report);
+    watch.check()?;
+    let synthesis = synthesis.map_err(|e| Error::file(&shape.object.path, e))?;
+    let context = TableContext {
+        hand: &hand.hand,
+        hand_path: &hand.path,
+        object: &shape.object,
+        grasp_object: &grasp_object,
+        seed: options.seed,
+    };
+    let rejected = synthesis
+        .rejected
+        .iter()
+        .map(|(reason, n)| (reason.to_string(), *n))
+        .collect();
+    let tries = Tries {
+        tried: synthesis.tried,
+        kept: synthesis.grasps.len(),
+        rejected,
+    };
+    Ok((to_frame(&context, &synthesis.grasps), tries))
+}
+
+/// Names a hand and an object for the planner, so that each pair draws its own numbers.
+pub fn stream(hand: &str, object: &str) -> String {
+    format!("{hand}/{object}")
+}
