@@ -1,0 +1,138 @@
+//! `prehend grasps FILE…`
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use prehend::frame::{Column, Frame};
+use serde_json::{Map, Value, json};
+
+use crate::output::{self, Outcome};
+
+/// List, filter and convert grasps
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  prehend grasps out/grasps/human --object mug_classic --min-epsilon 0.1 --format csv"
+)]
+pub struct Arguments {
+    /// Grasp tables (.parquet, .csv, .jsonl) or folders of them
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+
+    /// Only grasps on this object
+    #[arg(long)]
+    object: Option<String>,
+
+    /// Only grasps of this hand
+    #[arg(long)]
+    hand: Option<String>,
+
+    /// Only the grasp with this identifier
+    #[arg(long)]
+    grasp_id: Option<String>,
+
+    /// Only grasps with at least this epsilon
+    #[arg(long)]
+    min_epsilon: Option<f64>,
+
+    /// At most this many rows
+    #[arg(long)]
+    limit: Option<usize>,
+
+    /// How rows are printed
+    #[arg(long, value_enum, default_value = "json")]
+    format: Format,
+
+    /// Write the rows to a table (.parquet, .csv, .jsonl) instead of printing them
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Format {
+    Json,
+    Csv,
+}
+
+impl Arguments {
+    pub fn run(self, json: bool) -> Result<Outcome> {
+        let frame = read_tables(&self.files)?;
+        let rows = self.matching(&frame)?;
+        let chosen = frame.select(&rows);
+        if let Some(out) = &self.out {
+            chosen.write(out)?;
+            output::answer(
+                json,
+                &json!({ "rows": rows.len(), "out": out.to_string_lossy() }),
+                output::plain,
+            )?;
+            return Ok(Outcome::Done);
+        }
+        match self.format {
+            Format::Csv if !json => {
+                use std::io::Write;
+                std::io::stdout().lock().write_all(&chosen.to_csv()?)?;
+            }
+            _ => {
+                for row in 0..chosen.n_rows() {
+                    output::line(&row_json(&chosen, row))?;
+                }
+            }
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn matching(&self, frame: &Frame) -> Result<Vec<usize>> {
+        let mut rows: Vec<usize> = (0..frame.n_rows()).collect();
+        for (column, wanted) in [
+            ("object", &self.object),
+            ("hand", &self.hand),
+            ("grasp_id", &self.grasp_id),
+        ] {
+            if let Some(wanted) = wanted {
+                let values = frame.texts(column)?;
+                rows.retain(|&r| values[r] == *wanted);
+            }
+        }
+        if let Some(least) = self.min_epsilon {
+            let epsilon = frame.numbers("qeps")?;
+            rows.retain(|&r| epsilon[r] >= least);
+        }
+        rows.truncate(self.limit.unwrap_or(usize::MAX));
+        Ok(rows)
+    }
+}
+
+/// All tables of these files and folders as one; columns that not all have are dropped.
+pub fn read_tables(paths: &[PathBuf]) -> Result<Frame> {
+    let mut whole = Frame::new();
+    let mut found = 0;
+    for path in paths {
+        for file in prehend::files::list(path, &["parquet", "csv", "jsonl"])? {
+            whole.append(&Frame::read(&file)?);
+            found += 1;
+        }
+    }
+    if found == 0 {
+        bail!("no tables found; expected .parquet, .csv or .jsonl files, or folders that hold some");
+    }
+    Ok(whole)
+}
+
+/// One row as a JSON object; `contacts` becomes an array, missing cells null.
+pub fn row_json(frame: &Frame, row: usize) -> Value {
+    let cell = |name: &str, column: &Column| match column {
+        Column::Number(v) => json!(v[row]),
+        Column::Integer(v) => json!(v[row]),
+        Column::Text(v) => match &v[row] {
+            Some(text) if name == "contacts" => serde_json::from_str(text).unwrap_or_else(|_| json!(text)),
+            other => json!(other),
+        },
+    };
+    Value::Object(
+        frame
+            .columns()
+            .iter()
+            .map(|(n, c)| (n.clone(), cell(n, c)))
+            .collect::<Map<_, _>>(),
+    )
+}

@@ -1,0 +1,187 @@
+//! `prehend query MODEL --target NODE`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use prehend::frame::Frame;
+use prehend::training::to_table;
+use prehend_model::{Evidence, Model};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::model::read_model;
+use crate::output::{self, Outcome, Usage};
+
+/// Ask a model: any nodes given any others
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  prehend query out/models/human/task-action.bin --target task --evidence '{\"size\":[0.11,0.08,0.1],\"cvex\":1.3}'\n\
+  prehend query model.json --target upos --evidence '{\"task\":\"pouring\"}' --at '[[1,0,0],[0,0,1]]'"
+)]
+pub struct Arguments {
+    /// A model (.bin or .json)
+    model: PathBuf,
+
+    /// Nodes asked about, separated by commas; several give their joint distribution
+    #[arg(long, value_delimiter = ',')]
+    target: Vec<String>,
+
+    /// What is known: a JSON object from nodes to values
+    #[arg(long)]
+    evidence: Option<String>,
+
+    /// A table (CSV, Parquet, JSON lines); one answer a row, columns that belong to no node are ignored
+    #[arg(long, conflicts_with = "evidence")]
+    evidence_file: Option<PathBuf>,
+
+    /// JSON lines {"evidence":{…},"target":…,"at":[…]}; - is standard input
+    #[arg(long, conflicts_with_all = ["evidence", "evidence_file"])]
+    queries: Option<PathBuf>,
+
+    /// Points of a continuous target where the log density is wanted: a JSON array of arrays
+    #[arg(long)]
+    at: Option<String>,
+
+    /// Distribution of the discrete roots: as trained, uniform, or a JSON object like {"task":{"pouring":1}}
+    #[arg(long, default_value = "trained")]
+    prior: String,
+
+    /// Also how much each observed node speaks for each state of the (single, discrete) target
+    #[arg(long)]
+    explain: bool,
+
+    /// Also the most probable explanation: the likeliest values of all nodes that were not observed
+    #[arg(long)]
+    mpe: bool,
+}
+
+/// One question.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Question {
+    #[serde(default)]
+    evidence: Value,
+    #[serde(default)]
+    target: Option<Targets>,
+    #[serde(default)]
+    at: Vec<Vec<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Targets {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl Arguments {
+    pub fn run(self, json: bool) -> Result<Outcome> {
+        let model = self.apply_prior(read_model(&self.model)?)?;
+        let at: Vec<Vec<f64>> = match &self.at {
+            Some(text) => {
+                serde_json::from_str(text).map_err(|e| Usage(format!("--at: {e}; expected '[[x,y,…],…]'")))?
+            }
+            None => Vec::new(),
+        };
+        if let Some(file) = &self.queries {
+            let run = |line: Result<Value>| {
+                let question: Question =
+                    serde_json::from_value(line?).context("expected evidence, target and at")?;
+                let evidence = Evidence::from_json(&model, &or_empty(question.evidence))?;
+                let targets = match question.target {
+                    Some(Targets::One(name)) => name.split(',').map(str::to_owned).collect(),
+                    Some(Targets::Several(names)) => names,
+                    None => self.target.clone(),
+                };
+                let at = if question.at.is_empty() { &at } else { &question.at };
+                self.ask(&model, &targets, &evidence, at)
+            };
+            return output::each(json, "line", output::json_lines(file)?, run, output::plain);
+        }
+        if let Some(file) = &self.evidence_file {
+            let rows = evidence_rows(&model, file)?
+                .into_iter()
+                .enumerate()
+                .map(|(i, e)| (json!(i + 1), e));
+            return output::each(
+                json,
+                "line",
+                rows,
+                |e| self.ask(&model, &self.target, &e, &at),
+                output::plain,
+            );
+        }
+        let evidence = match &self.evidence {
+            Some(text) => {
+                let value: Value = serde_json::from_str(text)
+                    .map_err(|e| Usage(format!("--evidence: {e}; expected '{{\"NODE\": value}}'")))?;
+                Evidence::from_json(&model, &value)?
+            }
+            None => Evidence::new(),
+        };
+        output::answer(
+            json,
+            &self.ask(&model, &self.target, &evidence, &at)?,
+            output::plain,
+        )?;
+        Ok(Outcome::Done)
+    }
+
+    fn apply_prior(&self, model: Model) -> Result<Model> {
+        match self.prior.as_str() {
+            "trained" => Ok(model),
+            "uniform" => Ok(model.with_uniform_priors()),
+            text => {
+                let value: Value = serde_json::from_str(text).map_err(|e| {
+                    Usage(format!(
+                        "--prior: {e}; expected trained, uniform or '{{\"NODE\": {{\"STATE\": p}}}}'"
+                    ))
+                })?;
+                let Value::Object(nodes) = &value else {
+                    bail!(Usage(format!("--prior: found {value}, expected a JSON object")))
+                };
+                nodes.iter().try_fold(model, |model, (node, states)| {
+                    let prior: Vec<f64> = model
+                        .node(model.index(node)?)
+                        .states()
+                        .iter()
+                        .map(|s| states.get(s).and_then(Value::as_f64).unwrap_or(0.0))
+                        .collect();
+                    let total: f64 = prior.iter().sum();
+                    Ok(model.with_prior(node, &prior.iter().map(|p| p / total).collect::<Vec<_>>())?)
+                })
+            }
+        }
+    }
+
+    fn ask(&self, model: &Model, targets: &[String], evidence: &Evidence, at: &[Vec<f64>]) -> Result<Value> {
+        if targets.is_empty() && !self.mpe {
+            bail!(Usage("--target is missing: which node is asked about?".into()));
+        }
+        let mut answer = if targets.is_empty() {
+            json!({ "log_evidence": model.log_evidence(evidence)? })
+        } else {
+            let names: Vec<&str> = targets.iter().map(String::as_str).collect();
+            model.posterior(&names, evidence)?.to_json_at(at)?
+        };
+        if self.explain {
+            let [target] = targets else {
+                bail!(Usage("--explain needs exactly one --target".into()))
+            };
+            answer["explanation"] = model.explain(target, evidence)?.to_json();
+        }
+        if self.mpe {
+            answer["mpe"] = model.most_probable(evidence)?.to_json();
+        }
+        Ok(answer)
+    }
+}
+
+fn or_empty(value: Value) -> Value {
+    if value.is_null() { json!({}) } else { value }
+}
+
+fn evidence_rows(model: &Model, file: &Path) -> Result<Vec<Evidence>> {
+    let table = to_table(&Frame::read(file)?)?;
+    Evidence::from_table(model, &table).with_context(|| file.display().to_string())
+}

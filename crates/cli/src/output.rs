@@ -1,0 +1,109 @@
+//! What a command prints: JSON for programs, short text for people.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Result;
+use serde_json::{Map, Value, json};
+
+/// How a command ended when it did not stop with an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything asked for is done.
+    Done,
+    /// Some inputs failed; each said so in its place.
+    SomeFailed,
+}
+
+/// The arguments fit together badly; ends with status 2.
+#[derive(Debug)]
+pub struct Usage(pub String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+/// Prints one JSON value as a line.
+pub fn line(value: &Value) -> Result<()> {
+    writeln!(std::io::stdout().lock(), "{value}")?;
+    Ok(())
+}
+
+/// Prints JSON with `--json`, else what `text` makes of it.
+pub fn answer(json: bool, value: &Value, text: impl FnOnce(&Value) -> String) -> Result<()> {
+    if json {
+        line(value)
+    } else {
+        writeln!(std::io::stdout().lock(), "{}", text(value).trim_end())?;
+        Ok(())
+    }
+}
+
+/// Runs a command over many inputs: one answer each, in order; an input that fails gives `{key, "error"}` in its place.
+pub fn each<I>(
+    json: bool,
+    key: &str,
+    inputs: impl IntoIterator<Item = (Value, I)>,
+    mut run: impl FnMut(I) -> Result<Value>,
+    text: impl Fn(&Value) -> String,
+) -> Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    for (name, input) in inputs {
+        let mut object = Map::new();
+        object.insert(key.to_owned(), name.clone());
+        match run(input) {
+            Ok(Value::Object(fields)) => object.extend(fields),
+            Ok(other) => {
+                object.insert("value".into(), other);
+            }
+            Err(error) => {
+                outcome = Outcome::SomeFailed;
+                object.insert("error".into(), json!(format!("{error:#}")));
+                if !json {
+                    eprintln!("error: {error:#}");
+                    continue;
+                }
+            }
+        }
+        answer(json, &Value::Object(object), &text)?;
+    }
+    Ok(outcome)
+}
+
+/// The lines of a JSON-lines input (`-` is standard input): number from 1, and the value or what is wrong with it.
+pub fn json_lines(path: &Path) -> Result<Vec<(Value, Result<Value>)>> {
+    let text = prehend::files::read_text(path)?;
+    let lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
+    Ok(lines
+        .map(|(i, l)| {
+            let value = serde_json::from_str(l).map_err(|e| {
+                anyhow::anyhow!(
+                    "{}, line {}: {e}; expected one JSON object a line",
+                    path.display(),
+                    i + 1
+                )
+            });
+            (json!(i + 1), value)
+        })
+        .collect())
+}
+
+/// `key: value` lines of a JSON object, arrays and objects compact: the plain form of an answer.
+pub fn plain(value: &Value) -> String {
+    let Value::Object(fields) = value else {
+        return value.to_string();
+    };
+    let width = fields.keys().map(String::len).max().unwrap_or(0);
+    let cell = |v: &Value| match v {
+        Value::String(s) => s.clone(),
+        other => other.to_string(),
+    };
+    fields
+        .iter()
+        .map(|(k, v)| format!("{k:width$}  {}\n", cell(v)))
+        .collect()
+}
