@@ -187,8 +187,8 @@ impl<'a> Closing<'a> {
         if self.speeds[i] == 0.0 {
             return false;
         }
-        let now = self.gap(i, s, 1.0);
-        let later = self.gap(i, s + PROBE / self.speeds[i], 1.0);
+        let now = self.gap(i, s, NEAR);
+        let later = self.gap(i, s + PROBE / self.speeds[i], NEAR);
         later < now - PRESSING * PROBE || later <= CLEARANCE
     }
 

@@ -7,6 +7,9 @@ pub(crate) const CLEARANCE: f64 = 1e-6;
 /// A gap larger than this need not be known exactly to choose the next step, metres.
 pub(crate) const NEAR: f64 = 2.5e-3;
 
+/// A search goes on in this many slices of s.
+const N_SLICES: u32 = 12;
+
 /// Gaps between pairs of bodies that move with one parameter s.
 pub(crate) trait Motion {
     /// The gap of pair `i` at `s`, metres: 0 or less where the two overlap, `cutoff` where it is that or more.
@@ -34,6 +37,11 @@ pub(crate) struct Track {
 }
 
 impl Track {
+    /// Whether the pair must be looked at to know what happens before `horizon`, where `touch` is the first touch so far.
+    fn is_open(&self, horizon: f64, touch: f64) -> bool {
+        self.due < horizon.min(touch) || (touch <= horizon && !self.sure && self.free < touch)
+    }
+
     /// Nothing is known but that the pair is apart at `s`.
     pub(crate) fn apart_at(s: f64) -> Self {
         Self {
@@ -69,60 +77,73 @@ pub(crate) fn first_touch(motion: &impl Motion, tracks: &mut [Track], end: f64) 
         pressed: false,
     };
     let moving: Vec<usize> = (0..tracks.len()).filter(|i| motion.speed(*i) > 0.0).collect();
-    loop {
-        let mut next: Option<(f64, usize)> = None;
-        for &i in &moving {
-            let track = &tracks[i];
-            if track.due < touch.s || (!track.sure && track.free < touch.s) {
-                let at = track.due.min(touch.s);
-                if next.is_none_or(|(s, _)| at < s) {
-                    next = Some((at, i));
+    let start = moving.iter().map(|i| tracks[*i].free).fold(end, f64::min);
+    // In slices, so that no pair is followed far beyond what turns out to be the first touch.
+    for slice in 1..=N_SLICES {
+        let last = slice == N_SLICES;
+        let horizon = if last {
+            end
+        } else {
+            start + (end - start) * f64::from(slice) / f64::from(N_SLICES)
+        };
+        let mut settled = false;
+        while !settled {
+            settled = true;
+            for &i in &moving {
+                while tracks[i].is_open(horizon, touch.s) {
+                    settled = false;
+                    look_at(motion, i, &mut tracks[i], &mut touch)?;
                 }
             }
         }
-        let Some((s, i)) = next else {
-            return Ok(touch);
-        };
-        let track = &mut tracks[i];
-        let speed = motion.speed(i);
-        let gap = motion.look(i, s);
-        if gap <= CLEARANCE {
-            if track.free >= s {
-                return Err(i);
-            }
-            let pressed = track.grazing;
-            let at = last_free(motion, i, track.free, s);
-            touch = Touch {
-                s: at,
-                pair: Some(i),
-                pressed,
-            };
-            *track = Track {
-                free: at,
-                due: at,
-                sure: true,
-                grazing: pressed,
-            };
-        } else if gap <= TOUCH && !track.grazing {
-            touch = Touch {
-                s,
-                pair: Some(i),
-                pressed: false,
-            };
-            *track = Track {
-                free: s,
-                due: s,
-                sure: true,
-                grazing: false,
-            };
-        } else {
-            track.grazing &= gap <= TOUCH;
-            let (sure_step, least_step) = (gap - TOUCH / 2.0, motion.least_step(i));
-            track.free = s;
-            track.sure = sure_step >= least_step;
-            track.due = s + sure_step.max(least_step) / speed;
+        if touch.s <= horizon {
+            break;
         }
     }
+    Ok(touch)
+}
+
+/// Looks at one pair where it is due, and works out what follows.
+fn look_at(motion: &impl Motion, i: usize, track: &mut Track, touch: &mut Touch) -> Result<(), usize> {
+    let s = track.due.min(touch.s);
+    let gap = motion.look(i, s);
+    if gap <= CLEARANCE {
+        if track.free >= s {
+            return Err(i);
+        }
+        let pressed = track.grazing;
+        let at = last_free(motion, i, track.free, s);
+        *touch = Touch {
+            s: at,
+            pair: Some(i),
+            pressed,
+        };
+        *track = Track {
+            free: at,
+            due: at,
+            sure: true,
+            grazing: pressed,
+        };
+    } else if gap <= TOUCH && !track.grazing {
+        *touch = Touch {
+            s,
+            pair: Some(i),
+            pressed: false,
+        };
+        *track = Track {
+            free: s,
+            due: s,
+            sure: true,
+            grazing: false,
+        };
+    } else {
+        track.grazing &= gap <= TOUCH;
+        let (sure_step, least_step) = (gap - TOUCH / 2.0, motion.least_step(i));
+        track.free = s;
+        track.sure = sure_step >= least_step;
+        track.due = s + sure_step.max(least_step) / motion.speed(i);
+    }
+    Ok(())
 }
 
 /// Between `free` (apart) and `overlapping`: a parameter at which the gap is within the touching range.
@@ -133,7 +154,7 @@ fn last_free(motion: &impl Motion, i: usize, free: f64, overlapping: f64) -> f64
         if middle <= low || middle >= high {
             break;
         }
-        let gap = motion.gap(i, middle, 1.0);
+        let gap = motion.gap(i, middle, NEAR);
         if gap <= CLEARANCE {
             high = middle;
         } else {
