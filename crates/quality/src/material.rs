@@ -48,7 +48,7 @@ impl Material {
 
 /// Static friction coefficient between two materials; symmetric.
 ///
-/// Source: the table that `GraspIt`! uses by default (`docs/references.md`).
+/// Source: the table that GraspIt! uses by default (`docs/references.md`).
 ///
 /// ```
 /// use prehend_quality::{Material, friction_coefficient};

@@ -12,7 +12,7 @@ pub struct QualityOptions {
     pub center: Point3<f64>,
     /// Torques are divided by this length: the largest distance of a vertex from `center`. Positive and finite.
     pub torque_scale: f64,
-    /// Edges of a point contact's friction cone, 3 to [`QualityOptions::MOST_CONE_EDGES`]. The paper gives none; 8 as in `GraspIt`!.
+    /// Edges of a point contact's friction cone, 3 to [`QualityOptions::MOST_CONE_EDGES`]. The paper gives none; 8 as in GraspIt!.
     pub cone_edges: usize,
     /// How the contacts' wrenches add up.
     pub norm: Norm,

@@ -10,7 +10,7 @@
 /// an ellipse with semi-axes a, b. A radius that is not positive and finite (a flat or a saddle-shaped pair) counts as
 /// [`DEGENERATE_RADIUS`]; two such give 2.13 mm ([`soft_torsion_default`]). The result is positive and finite.
 ///
-/// Source: Johnson, Contact Mechanics (1985), sections 4.1 and 4.3; the values are `GraspIt`!'s.
+/// Source: Johnson, Contact Mechanics (1985), sections 4.1 and 4.3; the values are GraspIt!'s.
 pub fn soft_torsion(r1: f64, r2: f64) -> f64 {
     let usable = |r: f64| {
         if r.is_finite() && r > 0.0 {
