@@ -10,13 +10,13 @@
 //! whose density on held-out groups is within one standard error of the best.
 
 use rand::SeedableRng;
-use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::cpd::{Sign, n_mixture_parameters};
-use crate::em::{Mixing, Rows, row_log_densities};
+use crate::cross_validation::{HeldOut, best_held_out, cross_validate, mean};
+use crate::em::{Mixing, Rows};
 use crate::family::Family;
 use crate::network::{MixtureOrder, MixtureSpec, Weights};
 use crate::start::{FitOptions, Robust, fit_mixture};
@@ -26,10 +26,6 @@ use crate::train::TrainOptions;
 const NEAR_TIE: f64 = 2.0;
 /// Rows per free parameter of one component below which BIC is not asked.
 const ROWS_PER_PARAMETER: f64 = 2.0;
-/// Folds of the cross-validation over groups.
-const FOLDS: usize = 5;
-/// Starts of EM in each fold: the curve needs the order right, not the last nat.
-const FOLD_RESTARTS: usize = 2;
 
 /// What to fit.
 pub(crate) struct CellTask<'a> {
@@ -153,13 +149,13 @@ pub(crate) fn fit_cells(tasks: &[CellTask]) -> Vec<FittedCell> {
 }
 
 /// Runs the work in the given order, and returns the results in index order.
-fn in_order<T: Send>(order: &[usize], work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub(crate) fn in_order<T: Send>(order: &[usize], work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let mut out: Vec<(usize, T)> = order.par_iter().with_max_len(1).map(|&j| (j, work(j))).collect();
     out.sort_by_key(|(j, _)| *j);
     out.into_iter().map(|(_, value)| value).collect()
 }
 
-fn fit_options(options: &TrainOptions) -> FitOptions {
+pub(crate) fn fit_options(options: &TrainOptions) -> FitOptions {
     FitOptions {
         restarts: options.restarts,
         max_steps: options.max_steps,
@@ -168,7 +164,7 @@ fn fit_options(options: &TrainOptions) -> FitOptions {
 }
 
 /// A random stream of its own for every fit: order and threads do not matter.
-fn stream(task: &CellTask, k: usize, fold: usize) -> ChaCha8Rng {
+pub(crate) fn stream(task: &CellTask, k: usize, fold: usize) -> ChaCha8Rng {
     let cell = task.cell.map_or(0, |cell| cell + 1);
     let mut mixed = task.options.seed;
     for part in [task.node, cell, k, fold] {
@@ -179,9 +175,10 @@ fn stream(task: &CellTask, k: usize, fold: usize) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(mixed)
 }
 
-struct Prepared {
-    rows: Rows,
-    groups: Option<Vec<usize>>,
+/// Rows of a cell, ready for EM.
+pub(crate) struct Prepared {
+    pub rows: Rows,
+    pub groups: Option<Vec<usize>>,
     n_rows: usize,
     n_effective: f64,
     constant: bool,
@@ -351,121 +348,6 @@ fn best_bic(cell: &Prepared, fits: &[(usize, Robust)]) -> usize {
     let bics: Vec<f64> = fits.iter().map(|(k, fit)| score(cell, *k, fit).bic).collect();
     let least = bics.iter().copied().fold(f64::INFINITY, f64::min);
     bics.iter().position(|bic| *bic <= least + NEAR_TIE).unwrap_or(0)
-}
-
-/// Held-out log densities per group and number of components, for cells that ask for them.
-type HeldOut = Vec<Vec<f64>>;
-
-fn cross_validate(
-    tasks: &[CellTask],
-    prepared: &[Prepared],
-    fits: &[Vec<(usize, Robust)>],
-    chosen: &[usize],
-) -> Vec<Option<HeldOut>> {
-    let mut jobs = Vec::new();
-    let mut folds_of = Vec::with_capacity(tasks.len());
-    for (i, task) in tasks.iter().enumerate() {
-        let wanted = matches!(task.spec.order, MixtureOrder::Bic { guard: true, .. }) && task.grouped;
-        let folds = if wanted && chosen[i] > 0 {
-            folds(task, &prepared[i])
-        } else {
-            Vec::new()
-        };
-        for fold in 0..folds.len() {
-            for (k, _) in &fits[i][..=chosen[i]] {
-                jobs.push((i, fold, *k));
-            }
-        }
-        folds_of.push(folds);
-    }
-    let mut order: Vec<usize> = (0..jobs.len()).collect();
-    order.sort_by_key(|&j| std::cmp::Reverse(prepared[jobs[j].0].rows.n() * jobs[j].2));
-    let scores = in_order(&order, |j| {
-        let (i, fold, k) = jobs[j];
-        held_out(&tasks[i], &prepared[i], &folds_of[i][fold], k, fold)
-    });
-    let mut out: Vec<Option<HeldOut>> = folds_of
-        .iter()
-        .zip(chosen)
-        .map(|(folds, &best)| (!folds.is_empty()).then(|| vec![Vec::new(); best + 1]))
-        .collect();
-    for ((i, _, k), groups) in jobs.into_iter().zip(scores) {
-        let position = fits[i].iter().position(|(asked, _)| *asked == k).unwrap_or(0);
-        if let Some(held_out) = &mut out[i] {
-            held_out[position].extend(groups);
-        }
-    }
-    out
-}
-
-/// Rows of each fold; groups stay whole. None where there are too few groups.
-fn folds(task: &CellTask, cell: &Prepared) -> Vec<Vec<usize>> {
-    let Some(groups) = &cell.groups else {
-        return Vec::new();
-    };
-    let mut distinct = groups.clone();
-    distinct.sort_unstable();
-    distinct.dedup();
-    if distinct.len() < 3 {
-        return Vec::new();
-    }
-    distinct.shuffle(&mut stream(task, 0, usize::MAX));
-    let n = FOLDS.min(distinct.len());
-    let mut out = vec![Vec::new(); n];
-    for (row, group) in groups.iter().enumerate() {
-        let place = distinct.iter().position(|other| other == group).unwrap_or(0);
-        out[place % n].push(row);
-    }
-    out
-}
-
-/// Fits without a fold, and returns the mean log density of each of its groups.
-fn held_out(task: &CellTask, cell: &Prepared, fold: &[usize], k: usize, number: usize) -> Vec<f64> {
-    let Some(groups) = &cell.groups else {
-        return Vec::new();
-    };
-    let train: Vec<usize> = (0..cell.rows.n()).filter(|row| !fold.contains(row)).collect();
-    let options = FitOptions {
-        restarts: FOLD_RESTARTS,
-        ..fit_options(&task.options)
-    };
-    let fit = fit_mixture(
-        &cell.rows.select(&train),
-        k,
-        options,
-        &mut stream(task, k, number + 1),
-    );
-    let density = row_log_densities(&cell.rows.select(fold), &fit.fit.mixing);
-    let mut sums: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
-    for (&row, density) in fold.iter().zip(density) {
-        let (sum, mass) = sums.entry(groups[row]).or_default();
-        *sum += cell.rows.weights[row] * density;
-        *mass += cell.rows.weights[row];
-    }
-    sums.into_values().map(|(sum, mass)| sum / mass).collect()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-/// The fewest components whose held-out density is within one standard error, by group, of the best.
-fn best_held_out(held_out: &HeldOut) -> usize {
-    let means: Vec<f64> = held_out.iter().map(|groups| mean(groups)).collect();
-    let best = (0..means.len()).fold(0, |best, i| if means[i] > means[best] { i } else { best });
-    (0..best)
-        .find(|&i| {
-            let lost: Vec<f64> = held_out[best]
-                .iter()
-                .zip(&held_out[i])
-                .map(|(a, b)| a - b)
-                .collect();
-            let center = mean(&lost);
-            let variance =
-                lost.iter().map(|l| (l - center) * (l - center)).sum::<f64>() / (lost.len() as f64 - 1.0);
-            center <= (variance / lost.len() as f64).sqrt()
-        })
-        .unwrap_or(best)
 }
 
 fn conclude(

@@ -36,6 +36,7 @@ mod model;
 mod sample;
 
 mod cell;
+mod cross_validation;
 mod em;
 mod family;
 mod start;
@@ -47,6 +48,8 @@ mod posterior;
 
 mod batch;
 mod explain;
+mod hidden_block;
+mod plan;
 
 mod gaussian;
 mod sphere;

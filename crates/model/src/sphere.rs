@@ -8,14 +8,14 @@
 //! f(1) = 1/(2πi) ∫ exp(K(s) − s) ds
 //! ```
 //!
-//! The contour is the parabola through the saddle point with its focus at the first branch point, s = s₁ + D (u + i)²,
-//! on which the integrand falls like exp(−D u²); the trapezoidal rule converges exponentially there, whatever the
-//! floor of the covariance.
+//! The contour is the parabola s = s₀ + iy + y²/4p through the saddle point s₀ with its focus at the last branch point,
+//! s₀ + p = 1 / 2λ_min. On it every factor is largest at the saddle and the integrand falls like exp(−y²/4p), so the
+//! trapezoidal rule converges exponentially, whatever the floor of the covariance and however flat it is.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Trapezoid steps per width of the saddle: the error of the rule falls like exp(−2π² · steps²).
-const STEPS_PER_WIDTH: f64 = 8.0;
+const STEPS_PER_WIDTH: f64 = 6.0;
 /// Terms below this share of the peak do not show in the sum.
 const NEGLIGIBLE: f64 = 1e-18;
 /// More steps than any well-posed Gaussian takes.
@@ -34,33 +34,34 @@ pub(crate) fn log_sphere_normalizer(mean: &DVector<f64>, covariance: &DMatrix<f6
         .collect();
     let branch = 0.5 / lambdas.iter().copied().fold(0.0, f64::max);
     let distance = saddle_distance(&lambdas, &squares, branch);
-    let exponent = |s: Complex<f64>| -> Complex<f64> {
-        let mut sum = -s;
-        for (&lambda, &square) in lambdas.iter().zip(&squares) {
-            let gap = Complex::new(1.0, 0.0) - s * (2.0 * lambda);
-            sum += -0.5 * gap.ln() + s * square / gap;
-        }
-        sum
-    };
     let saddle = branch - distance;
-    let peak = exponent(Complex::new(saddle, 0.0)).re;
+    let largest = 0.5 / branch;
+    let gaps: Vec<f64> = lambdas
+        .iter()
+        .map(|l| (1.0 - l / largest) + 2.0 * l * distance)
+        .collect();
+    let mut peak = -saddle;
     let mut curvature = 0.0;
-    for (&lambda, &square) in lambdas.iter().zip(&squares) {
-        let gap = 1.0 - 2.0 * saddle * lambda;
+    for ((&lambda, &square), &gap) in lambdas.iter().zip(&squares).zip(&gaps) {
+        peak += -0.5 * gap.ln() + saddle * square / gap;
         curvature += 2.0 * lambda * lambda / (gap * gap) + 4.0 * lambda * square / (gap * gap * gap);
     }
-    let step = 1.0 / (curvature.sqrt() * 2.0 * distance * STEPS_PER_WIDTH);
-    let mut sum = 0.5 * 2.0 * distance;
+    let four_p = 4.0 * (0.5 / lambdas.iter().copied().fold(f64::INFINITY, f64::min) - saddle);
+    let step = 1.0 / (curvature.sqrt() * STEPS_PER_WIDTH);
+    // The lower half of the contour mirrors the upper one.
+    let mut sum = 0.5;
     let mut quiet = 0;
     for n in 1..MAX_STEPS {
-        let u = Complex::new(n as f64 * step, 1.0);
-        let value = (exponent(branch + distance * u * u) - peak).exp() * u * (2.0 * distance);
+        let y = n as f64 * step;
+        let away = Complex::new(y * y / four_p, y);
+        let mut exponent = -away;
+        for ((&lambda, &square), &gap) in lambdas.iter().zip(&squares).zip(&gaps) {
+            let here = gap - away * (2.0 * lambda);
+            exponent += (here / gap).ln() * -0.5 + away * square / (here * gap);
+        }
+        let value = exponent.exp() * Complex::new(2.0 * y / four_p, 1.0);
         sum += value.im;
-        quiet = if value.norm() < NEGLIGIBLE * distance {
-            quiet + 1
-        } else {
-            0
-        };
+        quiet = if value.norm() < NEGLIGIBLE { quiet + 1 } else { 0 };
         if quiet > 4 {
             break;
         }

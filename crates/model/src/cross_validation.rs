@@ -1,0 +1,128 @@
+//! Cross-validation over groups: how many components do unseen objects bear out?
+
+use rand::seq::SliceRandom;
+
+use crate::cell::{CellTask, Prepared, fit_options, in_order, stream};
+use crate::em::row_log_densities;
+use crate::network::MixtureOrder;
+use crate::start::{FitOptions, Robust, fit_mixture};
+
+/// Folds of the cross-validation over groups.
+const FOLDS: usize = 5;
+/// Starts of EM in each fold: the curve needs the order right, not the last nat.
+const FOLD_RESTARTS: usize = 2;
+
+/// Held-out log densities per group and number of components, for cells that ask for them.
+pub(crate) type HeldOut = Vec<Vec<f64>>;
+
+pub(crate) fn cross_validate(
+    tasks: &[CellTask],
+    prepared: &[Prepared],
+    fits: &[Vec<(usize, Robust)>],
+    chosen: &[usize],
+) -> Vec<Option<HeldOut>> {
+    let mut jobs = Vec::new();
+    let mut folds_of = Vec::with_capacity(tasks.len());
+    for (i, task) in tasks.iter().enumerate() {
+        let wanted = matches!(task.spec.order, MixtureOrder::Bic { guard: true, .. }) && task.grouped;
+        let folds = if wanted && chosen[i] > 0 {
+            folds(task, &prepared[i])
+        } else {
+            Vec::new()
+        };
+        for fold in 0..folds.len() {
+            for (k, _) in &fits[i][..=chosen[i]] {
+                jobs.push((i, fold, *k));
+            }
+        }
+        folds_of.push(folds);
+    }
+    let mut order: Vec<usize> = (0..jobs.len()).collect();
+    order.sort_by_key(|&j| std::cmp::Reverse(prepared[jobs[j].0].rows.n() * jobs[j].2));
+    let scores = in_order(&order, |j| {
+        let (i, fold, k) = jobs[j];
+        held_out(&tasks[i], &prepared[i], &folds_of[i][fold], k, fold)
+    });
+    let mut out: Vec<Option<HeldOut>> = folds_of
+        .iter()
+        .zip(chosen)
+        .map(|(folds, &best)| (!folds.is_empty()).then(|| vec![Vec::new(); best + 1]))
+        .collect();
+    for ((i, _, k), groups) in jobs.into_iter().zip(scores) {
+        let position = fits[i].iter().position(|(asked, _)| *asked == k).unwrap_or(0);
+        if let Some(held_out) = &mut out[i] {
+            held_out[position].extend(groups);
+        }
+    }
+    out
+}
+
+/// Rows of each fold; groups stay whole. None where there are too few groups.
+fn folds(task: &CellTask, cell: &Prepared) -> Vec<Vec<usize>> {
+    let Some(groups) = &cell.groups else {
+        return Vec::new();
+    };
+    let mut distinct = groups.clone();
+    distinct.sort_unstable();
+    distinct.dedup();
+    if distinct.len() < 3 {
+        return Vec::new();
+    }
+    distinct.shuffle(&mut stream(task, 0, usize::MAX));
+    let n = FOLDS.min(distinct.len());
+    let mut out = vec![Vec::new(); n];
+    for (row, group) in groups.iter().enumerate() {
+        let place = distinct.iter().position(|other| other == group).unwrap_or(0);
+        out[place % n].push(row);
+    }
+    out
+}
+
+/// Fits without a fold, and returns the mean log density of each of its groups.
+fn held_out(task: &CellTask, cell: &Prepared, fold: &[usize], k: usize, number: usize) -> Vec<f64> {
+    let Some(groups) = &cell.groups else {
+        return Vec::new();
+    };
+    let train: Vec<usize> = (0..cell.rows.n()).filter(|row| !fold.contains(row)).collect();
+    let options = FitOptions {
+        restarts: FOLD_RESTARTS,
+        ..fit_options(&task.options)
+    };
+    let fit = fit_mixture(
+        &cell.rows.select(&train),
+        k,
+        options,
+        &mut stream(task, k, number + 1),
+    );
+    let density = row_log_densities(&cell.rows.select(fold), &fit.fit.mixing);
+    let mut sums: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
+    for (&row, density) in fold.iter().zip(density) {
+        let (sum, mass) = sums.entry(groups[row]).or_default();
+        *sum += cell.rows.weights[row] * density;
+        *mass += cell.rows.weights[row];
+    }
+    sums.into_values().map(|(sum, mass)| sum / mass).collect()
+}
+
+pub(crate) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The fewest components whose held-out density is within one standard error, by group, of the best.
+pub(crate) fn best_held_out(held_out: &HeldOut) -> usize {
+    let means: Vec<f64> = held_out.iter().map(|groups| mean(groups)).collect();
+    let best = (0..means.len()).fold(0, |best, i| if means[i] > means[best] { i } else { best });
+    (0..best)
+        .find(|&i| {
+            let lost: Vec<f64> = held_out[best]
+                .iter()
+                .zip(&held_out[i])
+                .map(|(a, b)| a - b)
+                .collect();
+            let center = mean(&lost);
+            let variance =
+                lost.iter().map(|l| (l - center) * (l - center)).sum::<f64>() / (lost.len() as f64 - 1.0);
+            center <= (variance / lost.len() as f64).sqrt()
+        })
+        .unwrap_or(best)
+}
