@@ -86,11 +86,11 @@ fn network(run: &ImitationRun, out: &mut Sheet) -> Markup {
         (out.figure(&posterior, &html! { "Step 1. Posterior of the task given the demonstrated grasp’s object, action and constraints; recognised: " (out.task(task)) "." }))
         @if !run.objects.is_empty() {
             @let figure = candidates(&format!("experiment-c-{slug}-objects"), &run.objects, &format!("P({task} | o)"));
-            (out.figure(&figure, &html! { "Step 2.1. The imitator’s probability that each object affords " (task) ", and each object’s similarity with the demonstrated one (its own axis). The frame marks the choice." }))
+            (out.figure(&figure, &html! { "Step 2.1. The imitator’s probability that each object affords " (task) ", and each object’s similarity with the demonstrated one (its own axis). The frame marks the choice, by Eq. 5." }))
         }
         @if !run.grasps.is_empty() {
             @let figure = candidates(&format!("experiment-c-{slug}-grasps"), &run.grasps, &format!("P({task} | o, a, c)"));
-            (out.figure(&figure, &html! { "Step 2.2. Grasps on the chosen object by the probability of " (task) ", with their similarity to the demonstrated grasp. The frame marks the choice." }))
+            (out.figure(&figure, &html! { "Step 2.2. Grasps on the chosen object by the probability of " (task) ", with their similarity to the demonstrated grasp. The frame marks the choice, by Eq. 5." }))
         }
         @if run.joint.is_some() || run.joint_similar.is_some() {
             div.pair {
@@ -152,18 +152,14 @@ fn posterior(name: &str, run: &ImitationRun, tasks: &[String]) -> Figure {
 /// Pictures over two rows of bars from 0 to 1, one column a candidate: probability, and similarity on its own axis.
 /// Pictures inside are why this is not the chart crate's bar plot.
 fn candidates(name: &str, candidates: &[Candidate], p_label: &str) -> Figure {
-    let (left, column, picture, bar) = (150.0, 108.0, 96.0, 70.0);
+    let (left, column, picture, bar) = (166.0, 112.0, 96.0, 70.0);
     let with_similarity = candidates.iter().any(|c| c.similarity.is_some());
     let bars_top = picture + 40.0;
     let height = bars_top + bar + 12.0 + if with_similarity { bar + 26.0 } else { 0.0 };
     let mut pen = Pen::new(left + candidates.len() as f64 * column + 6.0, height);
-    let best = (0..candidates.len()).max_by(|&a, &b| {
-        // Ties go to the first.
-        candidates[a]
-            .p_task
-            .total_cmp(&candidates[b].p_task)
-            .then(b.cmp(&a))
-    });
+    // The choice is by Eq. 5 where it was computed; ties go to the first.
+    let score = |i: usize| candidates[i].total.unwrap_or(candidates[i].p_task);
+    let best = (0..candidates.len()).max_by(|&a, &b| score(a).total_cmp(&score(b)).then(b.cmp(&a)));
     let axis = |pen: &mut Pen, top: f64, label: &str| {
         for (at, tick) in [(0.0, "1"), (1.0, "0")] {
             let y = top + at * bar;
@@ -197,7 +193,7 @@ fn candidates(name: &str, candidates: &[Candidate], p_label: &str) -> Figure {
     }
     let alt = best.map_or_else(String::new, |b| {
         format!(
-            "Bars under pictures: {p_label}; the largest is {} with {:.3}.",
+            "Bars under pictures: {p_label}; the choice is {} with {:.3}.",
             candidates[b].name, candidates[b].p_task
         )
     });
@@ -225,11 +221,18 @@ fn value_bar(pen: &mut Pen, x: f64, column: f64, top: f64, full: f64, value: f64
     );
 }
 
-/// A name that fits under a picture: its first 17 characters.
+/// A name that fits under a picture: of a grasp its object and try, of anything its first 15 characters.
 fn shortened(name: &str) -> String {
-    if name.chars().count() <= 17 {
-        name.to_owned()
-    } else {
-        name.chars().take(16).chain(['…']).collect()
+    let name = match name.split('/').collect::<Vec<_>>()[..] {
+        [_, object, attempt] => format!("{object} {}", attempt.trim_start_matches('0')),
+        _ => name.to_owned(),
+    };
+    let length = name.chars().count();
+    if length <= 16 {
+        return name;
     }
+    // The end tells grasps apart.
+    let start: String = name.chars().take(9).collect();
+    let end: String = name.chars().skip(length - 6).collect();
+    format!("{start}…{end}")
 }
