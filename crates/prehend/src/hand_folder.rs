@@ -113,3 +113,57 @@ fn resource(folder: &Path, name: &str) -> PathBuf {
     }
     folder.join(inner)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_package_is_looked_for_in_the_folders_above() {
+        let root = tempfile::tempdir().unwrap();
+        let root = root.path().canonicalize().unwrap();
+        let urdf = root.join("my_hand/urdf");
+        for folder in ["my_hand/urdf", "my_hand/meshes", "other/meshes"] {
+            std::fs::create_dir_all(root.join(folder)).unwrap();
+        }
+        for file in [
+            "my_hand/meshes/palm.stl",
+            "other/meshes/tip.stl",
+            "my_hand/urdf/near.stl",
+        ] {
+            std::fs::write(root.join(file), "").unwrap();
+        }
+        for (name, found) in [
+            ("near.stl", "my_hand/urdf/near.stl"),
+            ("package://my_hand/meshes/palm.stl", "my_hand/meshes/palm.stl"),
+            ("package://other/meshes/tip.stl", "other/meshes/tip.stl"),
+            // Nobody above is called so: the rest of the name, beside the URDF.
+            ("package://elsewhere/near.stl", "my_hand/urdf/near.stl"),
+        ] {
+            assert_eq!(resource(&urdf, name), root.join(found), "{name}");
+        }
+        let absolute = root.join("other/meshes/tip.stl");
+        assert_eq!(
+            resource(&urdf, &format!("file://{}", absolute.display())),
+            absolute
+        );
+    }
+
+    #[test]
+    fn a_folder_without_a_hand_or_with_two_urdfs_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        let none = hand_folders(root.path()).unwrap_err().to_string();
+        assert!(
+            none.ends_with("holds no hand: no folder below it has a hand.toml"),
+            "{none}"
+        );
+        for file in ["a.urdf", "b.urdf"] {
+            std::fs::write(root.path().join(file), "").unwrap();
+        }
+        let two = read_hand(root.path()).err().unwrap().to_string();
+        assert!(
+            two.ends_with("holds 2 .urdf files; expected exactly one"),
+            "{two}"
+        );
+    }
+}
