@@ -126,14 +126,19 @@ impl Experiments {
             .filter(|k| several.contains(k))
             .map(|k| nth_last(k, 0))
             .collect();
-        let demonstration = objects
+        let shown = objects
             .iter()
             .filter(|o| o.kind == "mug")
             .chain(objects.iter().filter(|o| o.is_container()))
             .chain(objects)
             .next()
-            .map(|o| o.name.clone())
             .ok_or_else(|| Error::input("there are no objects to run experiments with"))?;
+        let demonstration = shown.name.clone();
+        let task = if shown.is_container() {
+            "pouring"
+        } else {
+            "tool-use"
+        };
         let mut candidates: Vec<String> = kinds
             .iter()
             .filter_map(|k| of_kind(k).into_iter().rev().find(|name| *name != demonstration))
@@ -149,7 +154,7 @@ impl Experiments {
             },
             c: ImitationExperiment {
                 demonstration,
-                task: "pouring".into(),
+                task: task.into(),
                 candidates,
                 lambda: 0.8,
             },

@@ -199,12 +199,13 @@ impl Object {
         guess::CONTAINERS.contains(&self.kind.as_str())
     }
 
-    /// All objects of a folder, sorted by path, with names that are unique.
+    /// All objects of a folder, sorted by path, with names that are unique: of two equal ones the second gets its type
+    /// in front, or a number behind. A file that cannot be read is left out, and its error kept.
     ///
     /// # Errors
     ///
-    /// The first file that cannot be read, or [`Error::File`] where the folder holds no mesh.
-    pub fn read_folder(folder: &Path, options: ObjectOptions) -> Result<Vec<Self>, Error> {
+    /// [`Error::File`] where the folder holds no mesh that can be read.
+    pub fn read_folder(folder: &Path, options: ObjectOptions) -> Result<ObjectFolder, Error> {
         let paths = files::list(folder, &MESH_EXTENSIONS)?;
         if paths.is_empty() {
             return Err(Error::file(
@@ -212,26 +213,47 @@ impl Object {
                 "holds no mesh; expected .off, .obj, .stl or .ply files at any depth",
             ));
         }
-        let mut objects = paths
-            .iter()
-            .map(|p| Self::read(p, options))
-            .collect::<Result<Vec<_>, _>>()?;
-        for i in 1..objects.len() {
-            if objects[..i].iter().any(|o| o.name == objects[i].name) {
-                objects[i].name = format!("{}_{}", objects[i].kind, objects[i].name);
-            }
-            if objects[..i].iter().any(|o| o.name == objects[i].name) {
-                return Err(Error::file(
-                    &objects[i].path,
-                    format!(
-                        "is the second object with the name `{}`; rename one of the files",
-                        objects[i].name
-                    ),
-                ));
+        let (mut objects, mut left_out): (Vec<Self>, Vec<Error>) = (Vec::new(), Vec::new());
+        for path in &paths {
+            match Self::read(path, options) {
+                Ok(mut object) => {
+                    object.name = unused_name(&object, &objects);
+                    objects.push(object);
+                }
+                Err(e) => left_out.push(e),
             }
         }
-        Ok(objects)
+        match left_out.first() {
+            Some(first) if objects.is_empty() => Err(Error::file(
+                folder,
+                format!(
+                    "none of its {} meshes can be used; the first: {first}",
+                    paths.len()
+                ),
+            )),
+            _ => Ok(ObjectFolder { objects, left_out }),
+        }
     }
+}
+
+/// What a folder of meshes gave.
+#[derive(Debug)]
+pub struct ObjectFolder {
+    /// The objects, sorted by path.
+    pub objects: Vec<Object>,
+    /// Why the other files are no objects; each error names its file.
+    pub left_out: Vec<Error>,
+}
+
+fn unused_name(object: &Object, others: &[Object]) -> String {
+    let free = |name: &String| others.iter().all(|o| o.name != *name);
+    let typed = format!("{}_{}", object.kind, object.name);
+    let numbered = (2..).map(|n| format!("{typed}_{n}"));
+    [object.name.clone(), typed.clone()]
+        .into_iter()
+        .chain(numbered)
+        .find(free)
+        .unwrap_or(typed)
 }
 
 fn place_boxes(boxes: &[PartBox], placement: &Placement) -> Result<Vec<OrientedBox>, Error> {

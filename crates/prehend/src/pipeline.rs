@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use prehend_grasp::SynthesisOptions;
 
 use crate::experiments::Experiments;
-use crate::progress::Watch;
+use crate::progress::{Noted, Watch};
 use crate::run_record::{Recorder, StageTime};
 use crate::stages::learn::{NamedNetwork, Trainer};
 use crate::stages::synthesize::HandData;
@@ -67,6 +67,14 @@ pub struct PipelineSummary {
 ///
 /// The first stage's that fails; finished work stays.
 pub fn run(options: &PipelineOptions, watch: Watch) -> Result<PipelineSummary, Error> {
+    let noted = Noted::new(watch.progress);
+    let (on_screen, watch) = (
+        watch,
+        Watch {
+            progress: &noted,
+            ..watch
+        },
+    );
     let out = options.out.as_path();
     let seed = options.seed;
     let mut recorder = Recorder::begin(out, options.arguments.clone(), seed);
@@ -77,8 +85,8 @@ pub fn run(options: &PipelineOptions, watch: Watch) -> Result<PipelineSummary, E
         .collect::<Result<_, _>>()?;
     let names: Vec<String> = hands.iter().map(|h| h.hand.name().to_owned()).collect();
     let networks = NamedNetwork::read_folder(&options.networks)?;
-    let objects = read_objects(options)?;
-    let experiments = read_experiments(options, &objects, &names, watch)?;
+    let objects = read_objects(options, watch)?;
+    let experiments = read_experiments(options, &objects, &names, on_screen)?;
 
     let shapes = recorder.stage(
         "decompose",
@@ -176,6 +184,7 @@ pub fn run(options: &PipelineOptions, watch: Watch) -> Result<PipelineSummary, E
     let n_grasps = grasp_files.iter().map(|f| f.tries.kept).sum();
     let (n_objects, n_hands) = (shapes.len(), hands.len());
     let so_far = recorder.record().clone();
+    let warnings = noted.warnings();
     let inputs = report::Inputs {
         run: &so_far,
         hands: &hands,
@@ -186,6 +195,7 @@ pub fn run(options: &PipelineOptions, watch: Watch) -> Result<PipelineSummary, E
         experiments: &experiments,
         answers: &answers,
         imitations: &imitations,
+        warnings: &warnings,
     };
     let page = recorder.stage(
         "report",
@@ -202,8 +212,12 @@ pub fn run(options: &PipelineOptions, watch: Watch) -> Result<PipelineSummary, E
     })
 }
 
-fn read_objects(options: &PipelineOptions) -> Result<Vec<Object>, Error> {
-    let mut objects = Object::read_folder(&options.objects, ObjectOptions::default())?;
+fn read_objects(options: &PipelineOptions, watch: Watch) -> Result<Vec<Object>, Error> {
+    let folder = Object::read_folder(&options.objects, ObjectOptions::default())?;
+    for error in &folder.left_out {
+        watch.progress.warn(&format!("left out: {error}"));
+    }
+    let mut objects = folder.objects;
     if options.quick {
         let mut seen: BTreeMap<String, usize> = BTreeMap::new();
         objects.retain(|o| {

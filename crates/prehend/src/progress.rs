@@ -1,5 +1,7 @@
 //! How a long stage tells where it is, and how it is told to stop.
 
+use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::Error;
@@ -43,6 +45,77 @@ impl Watch<'_> {
             Ok(())
         }
     }
+
+    /// The value of `result`; where its input is at fault, a warning that `what` is left out, and `None`, so that the
+    /// rest goes on. `file` is the input where it is a file.
+    ///
+    /// # Errors
+    ///
+    /// Those that are no fault of the input pass: other files that cannot be read or written, and [`Error::Stopped`].
+    pub fn or_left_out<T>(
+        &self,
+        what: &str,
+        file: Option<&Path>,
+        result: Result<T, Error>,
+    ) -> Result<Option<T>, Error> {
+        match result {
+            Ok(value) => Ok(Some(value)),
+            Err(e) => {
+                let at_fault = match &e {
+                    Error::Input(_) | Error::Model(_) => true,
+                    Error::File { path, .. } => Some(path.as_path()) == file,
+                    Error::Stopped => false,
+                };
+                if !at_fault {
+                    return Err(e);
+                }
+                self.progress.warn(&format!("{what} is left out: {e}"));
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// Passes everything on, and keeps the warnings for the report.
+pub struct Noted<'a> {
+    inner: &'a dyn Progress,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl<'a> Noted<'a> {
+    /// Listens in front of `inner`.
+    pub fn new(inner: &'a dyn Progress) -> Self {
+        Self {
+            inner,
+            warnings: Mutex::default(),
+        }
+    }
+
+    /// The warnings so far, in order.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.lock().map_or(Vec::new(), |w| w.clone())
+    }
+}
+
+impl Progress for Noted<'_> {
+    fn begin(&self, name: &str, total: u64) {
+        self.inner.begin(name, total);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.inner.advance(steps);
+    }
+
+    fn end(&self) {
+        self.inner.end();
+    }
+
+    fn warn(&self, message: &str) {
+        if let Ok(mut warnings) = self.warnings.lock() {
+            warnings.push(message.to_owned());
+        }
+        self.inner.warn(message);
+    }
 }
 
 static NEVER: AtomicBool = AtomicBool::new(false);
@@ -52,5 +125,29 @@ pub fn unwatched() -> Watch<'static> {
     Watch {
         progress: &Silent,
         stop: &NEVER,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_fault_of_the_input_is_left_out() {
+        let noted = Noted::new(&Silent);
+        let watch = Watch {
+            progress: &noted,
+            stop: &NEVER,
+        };
+        let (mine, other) = (Path::new("mine.ply"), Path::new("other.json"));
+        let of = |e: Error| watch.or_left_out("it", Some(mine), Err::<(), _>(e));
+        assert!(of(Error::input("no rows")).unwrap().is_none());
+        assert!(of(Error::file(mine, "is flat")).unwrap().is_none());
+        assert!(of(Error::file(other, "disk full")).is_err());
+        assert!(matches!(of(Error::Stopped), Err(Error::Stopped)));
+        assert_eq!(
+            noted.warnings(),
+            ["it is left out: no rows", "it is left out: mine.ply: is flat"]
+        );
     }
 }

@@ -118,7 +118,9 @@ impl Annotation {
                 )));
             }
         }
-        if let (Some(up), Some(front)) = (annotation.up, annotation.front)
+        // Where nothing is said, up is the file's +z.
+        let up = annotation.up.unwrap_or([0.0, 0.0, 1.0]);
+        if let Some(front) = annotation.front
             && Vector3::from(up)
                 .normalize()
                 .cross(&Vector3::from(front).normalize())
@@ -168,6 +170,10 @@ mod tests {
             (
                 "up = [0, 0, 0]",
                 "up = [0.0, 0.0, 0.0]: expected a direction, not a zero or infinite vector",
+            ),
+            (
+                "front = [0,0,-1]",
+                "front = [0.0, 0.0, -1.0] is parallel to up = [0.0, 0.0, 1.0]; expected two different directions",
             ),
             (
                 "up = [0,0,1]\nfront = [0,0,2]",

@@ -29,6 +29,9 @@ const FRONT_RATIO: f64 = 1.3;
 /// The share of the height below the top that counts as the rim.
 const RIM_SHARE: f64 = 0.02;
 
+/// A rim of a smaller radius (m) is a tip: nothing can be poured through it.
+const LEAST_OPENING: f64 = 0.001;
+
 /// Scale, up and front from the annotation, else guessed.
 pub(super) fn placement(
     mesh: &TriMesh,
@@ -157,6 +160,12 @@ pub(super) fn opening(object: &mut Object) {
     };
     let center = Point3::new(middle(0), middle(1), high.z);
     let radius = rim.iter().map(|p| (p - center).xy().norm()).fold(0.0, f64::max);
+    if radius < LEAST_OPENING {
+        object
+            .notes
+            .push("guessed: no opening, since the shape ends in a point at the top".to_owned());
+        return;
+    }
     object.notes.push(format!(
         "guessed: opening of radius {:.0} mm, from the rim at the top",
         radius * 1e3
@@ -245,5 +254,168 @@ fn mug_handle(object: &mut Object, boxes: &[OrientedBox]) {
             .notes
             .push("guessed: handle from the box farthest off the axis".to_owned());
         object.parts.handle = vec![*handle];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::ObjectOptions;
+
+    /// A box with these corners, of twelve triangles.
+    fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
+        let mesh = OrientedBox::new(
+            Point3::from((Vector3::from(low) + Vector3::from(high)) / 2.0),
+            Rotation3::identity(),
+            Vector3::from(high) - Vector3::from(low),
+        )
+        .unwrap();
+        let corner = |i: usize| {
+            let half = mesh.extents() / 2.0;
+            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            mesh.center() + Vector3::new(sign(0) * half.x, sign(1) * half.y, sign(2) * half.z)
+        };
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .collect();
+        TriMesh::new((0..8).map(corner).collect(), triangles).unwrap()
+    }
+
+    /// Two bodies in one mesh.
+    fn both(a: &TriMesh, b: &TriMesh) -> TriMesh {
+        let n = u32::try_from(a.vertices().len()).unwrap();
+        let vertices = a.vertices().iter().chain(b.vertices()).copied().collect();
+        let shifted = b.triangles().iter().map(|t| t.map(|i| i + n));
+        TriMesh::new(vertices, a.triangles().iter().copied().chain(shifted).collect()).unwrap()
+    }
+
+    fn object(kind: &str, mesh: TriMesh) -> Object {
+        let annotation = Annotation {
+            kind: Some(kind.into()),
+            ..Annotation::default()
+        };
+        Object::assemble(
+            Path::new("thing.ply"),
+            mesh,
+            &annotation,
+            ObjectOptions::default(),
+        )
+        .unwrap()
+    }
+
+    fn says(object: &Object, words: &str) -> bool {
+        object.notes.iter().any(|n| n.contains(words))
+    }
+
+    /// A mug in millimetres: a body 80 wide and 96 high, its handle towards −y.
+    fn mug_in_millimetres() -> TriMesh {
+        both(
+            &block([-40.0, -40.0, 0.0], [40.0, 40.0, 96.0]),
+            &block([-5.0, -90.0, 30.0], [5.0, -40.0, 60.0]),
+        )
+    }
+
+    #[test]
+    fn a_mug_in_millimetres_comes_in_metres_with_its_handle_in_front() {
+        let mug = object("mug", mug_in_millimetres());
+        assert_eq!(mug.placement.scale, 0.001);
+        assert!(says(&mug, "guessed: millimetres"), "{:?}", mug.notes);
+        assert!(mug.placement.front[1] < -0.99, "{:?}", mug.placement);
+        let (low, high) = mug.mesh.axis_aligned_bounds();
+        assert!((high.z - low.z - 0.096).abs() < 1e-9);
+        assert!(high.x > 0.089, "the handle points along +x: {high}");
+    }
+
+    #[test]
+    fn the_opening_lies_in_the_rim_at_the_top() {
+        let mug = object("mug", mug_in_millimetres());
+        let opening = mug.parts.opening.as_ref().unwrap();
+        assert!((opening.center - Point3::new(0.0, 0.0, 0.096)).norm() < 1e-9);
+        // A square rim: as far as its corners.
+        assert!((opening.radius - 0.04 * 2.0_f64.sqrt()).abs() < 1e-6);
+        assert!(says(&mug, "guessed: opening of radius 57 mm"), "{:?}", mug.notes);
+    }
+
+    #[test]
+    fn a_vessel_that_ends_in_a_point_has_no_opening() {
+        let cone = TriMesh::new(
+            vec![
+                Point3::new(-0.04, -0.04, 0.0),
+                Point3::new(0.04, -0.04, 0.0),
+                Point3::new(0.0, 0.04, 0.0),
+                Point3::new(0.0, 0.0, 0.1),
+            ],
+            vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        )
+        .unwrap();
+        let glass = object("glass", cone);
+        assert!(glass.parts.opening.is_none());
+        assert!(says(&glass, "no opening"), "{:?}", glass.notes);
+    }
+
+    #[test]
+    fn the_handle_of_a_mug_is_the_box_farthest_off_its_axis() {
+        let mut mug = object("mug", mug_in_millimetres());
+        let of = |center: [f64; 3], extents: [f64; 3]| {
+            OrientedBox::new(
+                Point3::from(center),
+                Rotation3::identity(),
+                Vector3::from(extents),
+            )
+            .unwrap()
+        };
+        let body = of([0.0, 0.0, 0.048], [0.08, 0.08, 0.096]);
+        let handle = of([0.065, 0.0, 0.045], [0.05, 0.01, 0.03]);
+        mug.guess_parts(&body, &[body, handle]);
+        assert_eq!(mug.parts.handle.len(), 1);
+        assert_eq!(mug.parts.handle[0].center(), handle.center());
+        assert!(says(&mug, "handle from the box farthest off the axis"));
+    }
+
+    #[test]
+    fn a_tool_works_with_its_highest_box_and_a_knife_cuts_with_it() {
+        let shaft = OrientedBox::new(
+            Point3::new(0.0, 0.0, 0.06),
+            Rotation3::identity(),
+            Vector3::new(0.02, 0.02, 0.12),
+        )
+        .unwrap();
+        let blade = OrientedBox::new(
+            Point3::new(0.0, 0.0, 0.2),
+            Rotation3::identity(),
+            Vector3::new(0.03, 0.004, 0.16),
+        )
+        .unwrap();
+        let mut knife = object("knife", block([-0.01, -0.01, 0.0], [0.01, 0.01, 0.28]));
+        knife.guess_parts(&shaft, &[shaft, blade]);
+        assert_eq!(knife.parts.functional[0].center(), blade.center());
+        assert_eq!(knife.parts.handle[0].center(), shaft.center());
+        assert_eq!(knife.parts.sharp.len(), 1);
+
+        // With one box alone, the upper half works.
+        let mut hammer = object("hammer", block([-0.01, -0.01, 0.0], [0.01, 0.01, 0.28]));
+        hammer.guess_parts(&shaft, &[shaft]);
+        assert!((hammer.parts.functional[0].center().z - 0.09).abs() < 1e-12);
+        assert!((hammer.parts.handle[0].center().z - 0.03).abs() < 1e-12);
+        assert!(hammer.parts.sharp.is_empty());
+    }
+
+    #[test]
+    fn an_extent_that_is_neither_metres_nor_millimetres_becomes_the_typical_one() {
+        let bottle = object("bottle", block([-0.3, -0.3, 0.0], [0.3, 0.3, 2.0]));
+        let (low, high) = bottle.mesh.axis_aligned_bounds();
+        assert!(((high - low).max() - 0.25).abs() < 1e-9);
+        assert!(says(&bottle, "set to 0.25 m"), "{:?}", bottle.notes);
     }
 }

@@ -66,11 +66,12 @@ pub struct Answers {
     pub ceilings: BTreeMap<String, f64>,
 }
 
-/// Runs both experiments and writes their tables to `out/experiments`.
+/// Runs both experiments and writes their tables to `out/experiments`. What the objects and labels do not allow is left
+/// out with a warning.
 ///
 /// # Errors
 ///
-/// Where a model cannot be trained or a table cannot be written, or [`Error::Stopped`].
+/// Where a table or a model cannot be written, or [`Error::Stopped`].
 pub fn run(
     datasets: &[Dataset],
     objects: &[Object],
@@ -82,34 +83,14 @@ pub fn run(
 ) -> Result<Answers, Error> {
     let n_steps = networks.len() * (1 + datasets.len() * experiments.b.folds.len());
     watch.progress.begin("ask", n_steps as u64);
-    let imitator = datasets
-        .iter()
-        .find(|d| d.hand == experiments.imitator)
-        .ok_or_else(|| Error::input(format!("the imitator `{}` has no grasps", experiments.imitator)))?;
-    let mut maps = Vec::new();
-    for network in networks {
-        watch.check()?;
-        if !experiments.a.held_out.is_empty() {
-            let trained = trainer.train(imitator, network, &experiments.a.held_out, "experiment-a")?;
-            for name in &experiments.a.held_out {
-                maps.push(task_maps(&trained.model, network, imitator, name)?);
-            }
-        }
-        watch.progress.advance(1);
-    }
-    let mut classifications = Vec::new();
-    for dataset in datasets {
-        for network in networks {
-            let mut folds = Vec::new();
-            for (fold, held_out) in experiments.b.folds.iter().enumerate() {
-                watch.check()?;
-                let trained = trainer.train(dataset, network, held_out, &format!("experiment-b-{fold}"))?;
-                folds.push(classify(&trained.model, &dataset.copies_on(held_out)?)?);
-                watch.progress.advance(1);
-            }
-            classifications.extend(merge(&dataset.hand, &network.name, &folds));
-        }
-    }
+    let run = Run {
+        experiments,
+        networks,
+        trainer,
+        watch,
+    };
+    let maps = run.maps(datasets)?;
+    let classifications = run.classifications(datasets)?;
     let tested: Vec<String> = experiments.b.folds.iter().flatten().cloned().collect();
     let ceilings = datasets
         .iter()
@@ -123,6 +104,88 @@ pub fn run(
     };
     write_tables(&answers, objects, out)?;
     Ok(answers)
+}
+
+/// What both experiments share.
+struct Run<'a> {
+    experiments: &'a Experiments,
+    networks: &'a [NamedNetwork],
+    trainer: &'a Trainer,
+    watch: Watch<'a>,
+}
+
+impl Run<'_> {
+    fn maps(&self, datasets: &[Dataset]) -> Result<Vec<TaskMaps>, Error> {
+        let (held_out, watch) = (&self.experiments.a.held_out, self.watch);
+        let imitator = datasets.iter().find(|d| d.hand == self.experiments.imitator);
+        let mut maps = Vec::new();
+        let Some(imitator) = imitator.filter(|_| !held_out.is_empty()) else {
+            watch.progress.warn(&if held_out.is_empty() {
+                "experiment A is left out: of none of hammer, bottle and mug are there two objects, one to hold out and one to learn from".to_owned()
+            } else {
+                format!("experiment A is left out: {} has no grasps", self.experiments.imitator)
+            });
+            return Ok(maps);
+        };
+        for network in self.networks {
+            watch.check()?;
+            let (what, purpose) = ("experiment A", "experiment-a");
+            let trained = self
+                .trainer
+                .train_or_warn(what, imitator, network, held_out, purpose, watch)?;
+            for (trained, name) in trained
+                .iter()
+                .flat_map(|t| held_out.iter().map(move |name| (t, name)))
+            {
+                let map = task_maps(&trained.model, network, imitator, name);
+                let what = format!("experiment A, network {}, {name}", network.name);
+                maps.extend(watch.or_left_out(&what, None, map)?);
+            }
+            watch.progress.advance(1);
+        }
+        Ok(maps)
+    }
+
+    fn classifications(&self, datasets: &[Dataset]) -> Result<Vec<Classification>, Error> {
+        let (folds, watch) = (&self.experiments.b.folds, self.watch);
+        if folds.is_empty() {
+            watch.progress.warn(
+                "experiment B is left out: no type has two objects, one to hold out and one to learn from",
+            );
+        }
+        let mut classifications = Vec::new();
+        for dataset in datasets {
+            for network in self.networks {
+                let mut answers = Vec::new();
+                for (fold, held_out) in folds.iter().enumerate() {
+                    watch.check()?;
+                    let (what, purpose) = (
+                        format!("experiment B, fold {}", fold + 1),
+                        format!("experiment-b-{fold}"),
+                    );
+                    let trained = self
+                        .trainer
+                        .train_or_warn(&what, dataset, network, held_out, &purpose, watch)?;
+                    let test = dataset.copies_on(held_out)?;
+                    if let (Some(trained), true) = (&trained, test.n_rows() > 0) {
+                        let answer = classify(&trained.model, &test);
+                        answers.extend(watch.or_left_out(&what, None, answer)?);
+                    } else if trained.is_some() {
+                        watch.progress.warn(&format!(
+                            "{what} with {} is left out: no grasp on {} has a label",
+                            dataset.hand,
+                            held_out.join(", ")
+                        ));
+                    }
+                    watch.progress.advance(1);
+                }
+                if !answers.is_empty() {
+                    classifications.extend(merge(&dataset.hand, &network.name, &answers));
+                }
+            }
+        }
+        Ok(classifications)
+    }
 }
 
 /// The density of the unified position on the sphere, per task, given the object's features.

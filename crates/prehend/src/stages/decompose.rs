@@ -68,11 +68,12 @@ struct ShapeFile {
     decomposition: Decomposition,
 }
 
-/// Reads every object below `folder` and decomposes it, or takes the boxes from an earlier run.
+/// Decomposes every object, or takes the boxes from an earlier run. An object that has no boxes is left out with a
+/// warning.
 ///
 /// # Errors
 ///
-/// The first object that cannot be read or has no boxes, by file.
+/// Where a file cannot be written, [`Error::Stopped`], or where no object is left.
 pub fn run(objects: Vec<Object>, out: &Path, watch: Watch) -> Result<Vec<Shape>, Error> {
     watch.progress.begin("decompose", objects.len() as u64);
     let options = DecomposeOptions::default();
@@ -80,10 +81,16 @@ pub fn run(objects: Vec<Object>, out: &Path, watch: Watch) -> Result<Vec<Shape>,
     for object in objects {
         watch.check()?;
         let path = out.join("shapes").join(format!("{}.json", object.name));
-        shapes.push(shape(object, &options, Some(&path))?);
+        let (name, file) = (object.name.clone(), object.path.clone());
+        shapes.extend(watch.or_left_out(&name, Some(&file), shape(object, &options, Some(&path)))?);
         watch.progress.advance(1);
     }
     watch.progress.end();
+    if shapes.is_empty() {
+        return Err(Error::input(
+            "no object can be decomposed; see the warnings above",
+        ));
+    }
     Ok(shapes)
 }
 

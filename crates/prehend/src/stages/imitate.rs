@@ -78,11 +78,11 @@ impl Imitation {
 }
 
 /// Runs the experiment with every network and writes its tables. Empty where demonstrator or imitator have no grasps on
-/// the objects that it needs; a warning then says which.
+/// the objects that it needs, or there is nothing to learn from without these; a warning then says which.
 ///
 /// # Errors
 ///
-/// Where a model cannot be trained or a table not be written, or [`Error::Stopped`].
+/// Where a model or a table cannot be written, or [`Error::Stopped`].
 pub fn run(
     datasets: &[Dataset],
     experiments: &Experiments,
@@ -92,40 +92,82 @@ pub fn run(
     watch: Watch,
 ) -> Result<Vec<Imitation>, Error> {
     watch.progress.begin("imitate", networks.len() as u64);
-    let of = |hand: &str| {
-        datasets
-            .iter()
-            .find(|d| d.hand == hand)
-            .ok_or_else(|| Error::input(format!("there are no grasps of {hand}")))
-    };
-    let (demonstrator, imitator) = (of(&experiments.demonstrator)?, of(&experiments.imitator)?);
     let mut runs = Vec::new();
-    match demonstration(demonstrator, experiments)? {
-        Some((id, shown)) => {
-            let mut held_out = experiments.c.candidates.clone();
-            held_out.push(experiments.c.demonstration.clone());
+    match Shown::new(datasets, experiments) {
+        Ok(shown) => {
             for network in networks {
                 watch.check()?;
-                let teacher = trainer.train(demonstrator, network, &held_out, "experiment-c")?;
-                let pupil = trainer.train(imitator, network, &held_out, "experiment-c")?;
-                let posterior = recognise(&teacher.model, &shown).map_err(Error::input)?;
-                let choice = Choice::new(imitator, experiments, &held_out)?;
-                let mut run = choice.of(&pupil.model, posterior.most_probable(), &shown)?;
-                run.network.clone_from(&network.name);
-                run.demonstration.clone_from(&id);
-                run.task_posterior = TASKS.map(|t| posterior.of(t));
-                runs.push(run);
+                runs.extend(shown.imitate(experiments, network, trainer, watch)?);
                 watch.progress.advance(1);
             }
         }
-        None => watch.progress.warn(&format!(
-            "experiment C is left out: {} has no {} grasp on {}",
-            experiments.demonstrator, experiments.c.task, experiments.c.demonstration
-        )),
+        Err(e) => {
+            watch.or_left_out("experiment C", None, Err::<(), _>(e))?;
+        }
     }
     watch.progress.end();
     write_tables(&runs, out)?;
     Ok(runs)
+}
+
+/// The demonstration, and the hands on both sides.
+struct Shown<'a> {
+    demonstrator: &'a Dataset,
+    imitator: &'a Dataset,
+    grasp_id: String,
+    features: Features,
+}
+
+impl<'a> Shown<'a> {
+    fn new(datasets: &'a [Dataset], experiments: &Experiments) -> Result<Self, Error> {
+        let of = |hand: &str| {
+            datasets
+                .iter()
+                .find(|d| d.hand == hand)
+                .ok_or_else(|| Error::input(format!("there are no grasps of {hand}")))
+        };
+        let (demonstrator, imitator) = (of(&experiments.demonstrator)?, of(&experiments.imitator)?);
+        let (grasp_id, features) = demonstration(demonstrator, experiments)?.ok_or_else(|| {
+            Error::input(format!(
+                "{} has no {} grasp on {}",
+                experiments.demonstrator, experiments.c.task, experiments.c.demonstration
+            ))
+        })?;
+        Ok(Self {
+            demonstrator,
+            imitator,
+            grasp_id,
+            features,
+        })
+    }
+
+    fn imitate(
+        &self,
+        experiments: &Experiments,
+        network: &NamedNetwork,
+        trainer: &Trainer,
+        watch: Watch,
+    ) -> Result<Option<Imitation>, Error> {
+        let mut held_out = experiments.c.candidates.clone();
+        held_out.push(experiments.c.demonstration.clone());
+        let train = |dataset: &Dataset| {
+            trainer.train_or_warn("experiment C", dataset, network, &held_out, "experiment-c", watch)
+        };
+        let (Some(teacher), Some(pupil)) = (train(self.demonstrator)?, train(self.imitator)?) else {
+            return Ok(None);
+        };
+        let answer = || {
+            let posterior = recognise(&teacher.model, &self.features).map_err(Error::input)?;
+            let choice = Choice::new(self.imitator, experiments, &held_out)?;
+            let mut run = choice.of(&pupil.model, posterior.most_probable(), &self.features)?;
+            run.network.clone_from(&network.name);
+            run.demonstration.clone_from(&self.grasp_id);
+            run.task_posterior = TASKS.map(|t| posterior.of(t));
+            Ok(run)
+        };
+        let what = format!("experiment C with the network {}", network.name);
+        watch.or_left_out(&what, None, answer())
+    }
 }
 
 /// The demonstrator's grasp with the task's label and the largest ε.
@@ -203,6 +245,13 @@ impl Choice {
                 features: all[r],
             })
             .collect();
+        if grasps.is_empty() {
+            return Err(Error::input(format!(
+                "{} has no grasp on any object to choose from ({})",
+                imitator.hand,
+                experiments.c.candidates.join(", ")
+            )));
+        }
         let objects = experiments
             .c
             .candidates

@@ -50,17 +50,23 @@ impl Labels {
         LabelStore::open(&self.store)?.answers(persona, datasets)
     }
 
-    /// The margins of one hand's grasps on one object: `grasp_id` and a column a rule.
+    /// The margins of one table's grasps: `grasp_id` and a column a rule; `None` where the tutor could not judge them.
     ///
     /// # Errors
     ///
     /// Where the table cannot be read.
-    pub fn margins_of(&self, hand: &str, object: &str) -> Result<Frame, Error> {
-        Frame::read(&self.margins.join(hand).join(format!("{object}.parquet")))
+    pub fn margins_of(&self, file: &GraspFile) -> Result<Option<Frame>, Error> {
+        let path = self
+            .margins
+            .join(&file.hand)
+            .join(format!("{}.parquet", file.object));
+        let known = Frame::read_metadata(&path).get("fingerprint") == Some(&file.fingerprint);
+        known.then(|| Frame::read(&path)).transpose()
     }
 }
 
-/// Labels every grasp with every persona, except where an earlier run did.
+/// Labels every grasp with every persona, except where an earlier run did. An object that the tutor cannot judge is left
+/// out with a warning.
 ///
 /// # Errors
 ///
@@ -93,7 +99,9 @@ pub fn run(
                 .margins
                 .join(&file.hand)
                 .join(format!("{}.parquet", file.object));
-            label_file(&tutor_hand, shape, file, seed, &mut store, &margins)?;
+            let result = label_file(&tutor_hand, shape, file, seed, &mut store, &margins);
+            let what = format!("labelling {} with {}", file.object, file.hand);
+            watch.or_left_out(&what, Some(&shape.object.path), result)?;
             labels
                 .datasets
                 .entry(file.hand.clone())

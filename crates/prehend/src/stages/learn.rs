@@ -222,9 +222,11 @@ impl Trainer {
     /// A network trained on a dataset without the objects held out. `purpose` names the model's place:
     /// `models/HAND/NETWORK` for the model that users ask, `models/HAND/PURPOSE/NETWORK` for an experiment's.
     ///
+    /// A task without rows stays in the model, as likely as its pseudo-count says, with the features of all tasks.
+    ///
     /// # Errors
     ///
-    /// Where a task has no row, or the model crate's own.
+    /// Where there is no row at all, or the model crate's own.
     pub fn train(
         &self,
         dataset: &Dataset,
@@ -252,10 +254,10 @@ impl Trainer {
         let balanced = copies.select(&balanced_rows(&copies, "task", Some("object"), self.seed)?);
         let tasks = balanced.texts("task")?;
         let rows = TASKS.map(|task| tasks.iter().filter(|t| *t == task).count());
-        if let Some(missing) = TASKS.iter().zip(rows).find(|(_, n)| *n == 0) {
+        if rows.iter().sum::<usize>() == 0 {
             return Err(Error::input(format!(
-                "{}: no grasp on the training objects is labelled `{}`; give more tries or objects that afford it",
-                dataset.hand, missing.0
+                "{}: no grasp on the training objects has a label; give more tries, or objects that afford a task",
+                dataset.hand
             )));
         }
         let options = TrainOptions {
@@ -280,6 +282,39 @@ impl Trainer {
             .with_extra("training", report.clone());
         write_model(&base, &model)?;
         Ok(Trained { model, rows, report })
+    }
+
+    /// [`Trainer::train`] inside a run: where there is nothing to learn from, `None` and a warning that `what` is left out;
+    /// a warning also names tasks without rows.
+    ///
+    /// # Errors
+    ///
+    /// Where a file cannot be read or written.
+    pub fn train_or_warn(
+        &self,
+        what: &str,
+        dataset: &Dataset,
+        network: &NamedNetwork,
+        held_out: &[String],
+        purpose: &str,
+        watch: Watch,
+    ) -> Result<Option<Trained>, Error> {
+        let what = format!("{what} with {} and the network {}", dataset.hand, network.name);
+        let trained = watch.or_left_out(&what, None, self.train(dataset, network, held_out, purpose))?;
+        if let Some(trained) = &trained {
+            let unseen: Vec<&str> = TASKS
+                .into_iter()
+                .zip(trained.rows)
+                .filter_map(|(task, n)| (n == 0).then_some(task))
+                .collect();
+            if !unseen.is_empty() {
+                watch.progress.warn(&format!(
+                    "{what}: no training grasp is labelled {}, so what the model says of it is a guess from all grasps",
+                    unseen.join(" or ")
+                ));
+            }
+        }
+        Ok(trained)
     }
 }
 
@@ -313,11 +348,12 @@ pub struct Learned {
     pub models: Vec<(String, String, Trained)>,
 }
 
-/// Joins grasps and labels and trains every network for every hand.
+/// Joins grasps and labels and trains every network for every hand. A hand without grasps or labels is left out with a
+/// warning.
 ///
 /// # Errors
 ///
-/// As [`Trainer::train`].
+/// Where a table cannot be read or a model not be written, or [`Error::Stopped`].
 pub fn run(
     hands: &[HandData],
     grasp_files: &[GraspFile],
@@ -333,11 +369,15 @@ pub fn run(
     let (mut datasets, mut models) = (Vec::new(), Vec::new());
     for hand in hands {
         let answers = labels.answers(hand.hand.name(), &experiments.persona)?;
-        let dataset = Dataset::read(hand.hand.name(), grasp_files, answers)?;
+        let what = format!("learning with {}", hand.hand.name());
+        let read = Dataset::read(hand.hand.name(), grasp_files, answers);
+        let Some(dataset) = watch.or_left_out(&what, None, read)? else {
+            continue;
+        };
         for network in networks {
             watch.check()?;
-            let trained = trainer.train(&dataset, network, &[], "")?;
-            models.push((dataset.hand.clone(), network.name.clone(), trained));
+            let trained = trainer.train_or_warn("learning", &dataset, network, &[], "", watch)?;
+            models.extend(trained.map(|t| (dataset.hand.clone(), network.name.clone(), t)));
             watch.progress.advance(1);
         }
         datasets.push(dataset);

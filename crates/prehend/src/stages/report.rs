@@ -47,6 +47,8 @@ pub struct Inputs<'a> {
     pub answers: &'a Answers,
     /// Experiment C.
     pub imitations: &'a [Imitation],
+    /// What the run warned of: files and experiments that were left out, and why.
+    pub warnings: &'a [String],
 }
 
 /// The page that was written.
@@ -82,7 +84,7 @@ pub fn run(inputs: &Inputs, out: &Path, watch: Watch) -> Result<WrittenPage, Err
     watch.progress.advance(1);
     data.experiment_a = experiments::maps(inputs, &stand)?;
     watch.check()?;
-    data.experiment_b = Some(experiments::classification(inputs));
+    data.experiment_b = experiments::classification(inputs);
     data.experiment_c = experiments::imitation(inputs, &stand)?;
     watch.progress.advance(1);
     data.summary = overview::summary(inputs, &stand)?;

@@ -70,7 +70,8 @@ pub struct Tries {
     pub rejected: BTreeMap<String, usize>,
 }
 
-/// Plans and closes `options.tries` grasps of each hand on each object, except where an earlier run did.
+/// Plans and closes `options.tries` grasps of each hand on each object, except where an earlier run did. A pair that the
+/// planner cannot work with is left out with a warning.
 ///
 /// # Errors
 ///
@@ -91,7 +92,9 @@ pub fn run(
         );
         for shape in shapes {
             watch.check()?;
-            grasp_files.push(one(hand, shape, options, out, watch)?);
+            let what = format!("{} with {}", shape.object.name, hand.hand.name());
+            let result = one(hand, shape, options, out, watch);
+            grasp_files.extend(watch.or_left_out(&what, Some(&shape.object.path), result)?);
         }
         watch.progress.end();
     }

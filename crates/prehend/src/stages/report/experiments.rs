@@ -118,7 +118,10 @@ fn marks(inputs: &Inputs, object: &str, task: &str) -> Result<Vec<Vector3<f64>>,
         .collect())
 }
 
-pub(super) fn classification(inputs: &Inputs) -> ExperimentB {
+pub(super) fn classification(inputs: &Inputs) -> Option<ExperimentB> {
+    if inputs.answers.classifications.is_empty() {
+        return None;
+    }
     let mut results: Vec<Confusions> = Vec::new();
     for c in &inputs.answers.classifications {
         let matrix = Confusion {
@@ -162,7 +165,7 @@ pub(super) fn classification(inputs: &Inputs) -> ExperimentB {
         .map(|c| format!("{} with {}: {:.0} %", c.hand, c.network, c.in_label_set * 100.0))
         .collect();
     let folds: Vec<String> = inputs.experiments.b.folds.iter().map(|f| f.join(", ")).collect();
-    ExperimentB {
+    Some(ExperimentB {
         account: Account {
             answer: format!("Mean recall of the task given O, A, C: {}.", best.join("; ")),
             measured: vec![
@@ -176,7 +179,7 @@ pub(super) fn classification(inputs: &Inputs) -> ExperimentB {
             ],
         },
         results,
-    }
+    })
 }
 
 pub(super) fn imitation(inputs: &Inputs, stand: &Stand) -> Result<Option<ExperimentC>, Error> {

@@ -138,10 +138,10 @@ fn rules(inputs: &Inputs, decided: &BTreeMap<String, usize>) -> Result<Vec<RuleR
     let mut margins: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     let mut features: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for file in inputs.grasp_files.iter().filter(|f| f.tries.kept > 0) {
-        let (grasps, table) = (
-            Frame::read(&file.path)?,
-            inputs.labels.margins_of(&file.hand, &file.object)?,
-        );
+        let Some(table) = inputs.labels.margins_of(file)? else {
+            continue;
+        };
+        let grasps = Frame::read(&file.path)?;
         for rule in Rule::ALL {
             margins
                 .entry(rule.name())

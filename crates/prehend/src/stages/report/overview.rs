@@ -196,6 +196,7 @@ pub(super) fn limits(inputs: &Inputs) -> Vec<String> {
             "Some objects' scale, direction or parts were guessed; each guess stands with its object.".into(),
         );
     }
+    limits.extend(inputs.warnings.iter().cloned());
     limits
 }
 
