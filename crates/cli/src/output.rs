@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde_json::{Map, Value, json};
 
 /// How a command ended when it did not stop with an error.
@@ -74,22 +74,46 @@ pub fn each<I>(
     Ok(outcome)
 }
 
-/// The lines of a JSON-lines input (`-` is standard input): number from 1, and the value or what is wrong with it.
-pub fn json_lines(path: &Path) -> Result<Vec<(Value, Result<Value>)>> {
-    let text = prehend::files::read_text(path)?;
-    let lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
-    Ok(lines
-        .map(|(i, l)| {
-            let value = serde_json::from_str(l).map_err(|e| {
-                anyhow::anyhow!(
-                    "{}, line {}: {e}; expected one JSON object a line",
-                    path.display(),
-                    i + 1
-                )
-            });
-            (json!(i + 1), value)
-        })
-        .collect())
+/// Runs a command over the lines of a JSON-lines input (`-` is standard input): one answer each, with `line` counted
+/// from 1; empty lines have no answer. Errors say file and line.
+pub fn each_json_line(
+    json: bool,
+    path: &Path,
+    mut run: impl FnMut(Value) -> Result<Value>,
+    text: impl Fn(&Value) -> String,
+) -> Result<Outcome> {
+    let input = prehend::files::read_text(path)?;
+    let lines = (1..).zip(input.lines()).filter(|(_, l)| !l.trim().is_empty());
+    let run = |(number, line): (usize, &str)| {
+        json_object(line)
+            .and_then(&mut run)
+            .with_context(|| format!("{}, line {number}", shown(path)))
+    };
+    each(json, "line", lines.map(|(i, l)| (json!(i), (i, l))), run, text)
+}
+
+fn json_object(line: &str) -> Result<Value> {
+    let value: Value = serde_json::from_str(line).map_err(|e| {
+        // The parser sees one line alone, so its own line number would mislead.
+        let said = e.to_string();
+        let what = said
+            .split_once(" at line ")
+            .map_or(said.as_str(), |(what, _)| what);
+        anyhow::anyhow!("column {}: {what}; expected one JSON object a line", e.column())
+    })?;
+    if !value.is_object() {
+        anyhow::bail!("found {value}, expected a JSON object");
+    }
+    Ok(value)
+}
+
+/// A path as messages name it.
+pub fn shown(path: &Path) -> String {
+    if path == Path::new("-") {
+        "standard input".to_owned()
+    } else {
+        path.display().to_string()
+    }
 }
 
 /// `key: value` lines of a JSON object, arrays and objects compact: the plain form of an answer.

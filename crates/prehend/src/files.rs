@@ -21,14 +21,17 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
             .map_err(|e| Error::file(path, e))?;
         return Ok(bytes);
     }
-    fs::read(path).map_err(|e| {
-        let hint = if e.kind() == std::io::ErrorKind::NotFound {
-            "; check the path"
-        } else {
-            ""
-        };
-        Error::file(path, format!("{e}{hint}"))
-    })
+    fs::read(path).map_err(|e| unreadable(path, &e))
+}
+
+/// What the system said of a file or folder, in a person's words where the cause is common.
+pub(crate) fn unreadable(path: &Path, error: &std::io::Error) -> Error {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => Error::file(path, "is not there; check the path"),
+        std::io::ErrorKind::IsADirectory => Error::file(path, "is a folder; expected a file"),
+        std::io::ErrorKind::NotADirectory => Error::file(path, "is a file; expected a folder"),
+        _ => Error::file(path, error),
+    }
 }
 
 /// The text of a file.
@@ -76,14 +79,15 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     })
 }
 
-/// Every file below `folder` with one of the extensions (lower case), sorted by path; a file is its own answer.
+/// Every file below `folder` with one of the extensions (lower case), sorted by path; a file is its own answer, and so
+/// is `-`, standard input.
 ///
 /// # Errors
 ///
 /// [`Error::File`] where a folder cannot be listed.
 pub fn list(folder: &Path, extensions: &[&str]) -> Result<Vec<PathBuf>, Error> {
     fn visit(path: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> Result<(), Error> {
-        let entries = fs::read_dir(path).map_err(|e| Error::file(path, e))?;
+        let entries = fs::read_dir(path).map_err(|e| unreadable(path, &e))?;
         for entry in entries {
             let entry = entry.map_err(|e| Error::file(path, e))?.path();
             if entry.is_dir() {
@@ -94,7 +98,7 @@ pub fn list(folder: &Path, extensions: &[&str]) -> Result<Vec<PathBuf>, Error> {
         }
         Ok(())
     }
-    if folder.is_file() {
+    if folder.is_file() || folder == Path::new("-") {
         return Ok(vec![folder.to_owned()]);
     }
     let mut found = Vec::new();

@@ -211,18 +211,28 @@ impl Frame {
     ///
     /// [`Error::File`]; a half-written file never stands under its final name.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
+        Self::check_name(path)?;
         let bytes = match files::extension(path).as_deref() {
             Some("parquet" | "pq") => parquet_table::write(self)?,
             Some("jsonl" | "ndjson") => json_lines::write(self),
-            Some("csv") => csv_table::write(self)?,
-            _ => {
-                return Err(Error::file(
-                    path,
-                    "is no table's name; end it with .parquet, .csv or .jsonl",
-                ));
-            }
+            _ => csv_table::write(self)?,
         };
         files::write(path, &bytes)
+    }
+
+    /// Whether [`Frame::write`] knows the path's extension, for asking before long work.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::File`] where it does not.
+    pub fn check_name(path: &Path) -> Result<(), Error> {
+        match files::extension(path).as_deref() {
+            Some("parquet" | "pq" | "jsonl" | "ndjson" | "csv") => Ok(()),
+            _ => Err(Error::file(
+                path,
+                "is no table's name; end it with .parquet, .csv or .jsonl",
+            )),
+        }
     }
 
     /// The table as CSV text.

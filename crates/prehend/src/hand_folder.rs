@@ -78,7 +78,7 @@ pub fn hand_folders(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 fn urdf_of_folder(folder: &Path) -> Result<PathBuf, Error> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let entries = std::fs::read_dir(folder).map_err(|e| files::unreadable(folder, &e))?;
     let mut urdfs: Vec<PathBuf> = entries
         .filter_map(|e| Some(e.ok()?.path()))
         .filter(|p| files::extension(p).as_deref() == Some("urdf"))

@@ -18,5 +18,15 @@ pub mod run_record;
 pub mod stages;
 pub mod training;
 
+/// The crates below, so that a program needs only this one.
+pub use prehend_geometry as geometry;
+pub use prehend_grasp as grasp;
+pub use prehend_hand as hand;
+pub use prehend_imitation as imitation;
+pub use prehend_model as model;
+pub use prehend_quality as quality;
+pub use prehend_report as report;
+pub use prehend_tutor as tutor;
+
 pub use error::Error;
 pub use object::{Object, ObjectOptions};

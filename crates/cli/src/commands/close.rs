@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use prehend::ObjectOptions;
+use prehend::grasp::{CloseOptions, GraspObject, close};
 use prehend::grasp_table::ContactRecord;
+use prehend::hand::Hand;
 use prehend::stages::decompose::shape_of;
 use prehend::stages::synthesize::HandData;
-use prehend_grasp::{CloseOptions, GraspObject, close};
-use prehend_hand::Hand;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -20,7 +20,7 @@ use crate::output::{self, Outcome};
 /// Close a user's own grasp candidates
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  echo '{\"pose\":{\"translation\":[0,0,0.25],\"quaternion_wxyz\":[0,1,0,0]},\"joints\":{},\"approach\":true}' \\\n      | prehend close --hand hands/schunk_sdh --object objects/mug/mug_classic.ply - --json"
+    after_help = "Example:\n  echo '{\"pose\":{\"translation\":[0,0,0.25],\"quaternion_wxyz\":[0,1,0,0]},\"joints\":{},\"approach\":true}' \\\n      | prehend close --hand hands/schunk_sdh --object objects/mug/coffee_mug.ply - --json"
 )]
 pub struct Arguments {
     /// A folder with hand.toml and a URDF
@@ -65,8 +65,8 @@ impl Arguments {
         let hand = HandData::read(&self.hand)?.hand;
         let shape = shape_of(&self.object, ObjectOptions { as_is: self.as_is })?;
         let object = shape.grasp_object()?;
-        let run = |line: Result<Value>| closed(&hand, &object, line?, self.support_plane);
-        output::each(json, "line", output::json_lines(&self.file)?, run, output::plain)
+        let run = |line: Value| closed(&hand, &object, line, self.support_plane);
+        output::each_json_line(json, &self.file, run, output::plain)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use prehend_geometry::{DecomposeOptions, decompose};
+use prehend::geometry::{DecomposeOptions, decompose};
 use serde_json::{Value, json};
 
 use super::mesh::box_json;

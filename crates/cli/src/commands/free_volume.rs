@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::Point3;
-use prehend_geometry::{OrientedBox, Tetrahedron, largest_tetrahedron, union_volume};
+use prehend::geometry::{OrientedBox, Tetrahedron, largest_tetrahedron, union_volume};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -32,13 +32,7 @@ struct Line {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        output::each(
-            json,
-            "line",
-            output::json_lines(&self.file)?,
-            |v| free_volume(v?),
-            output::plain,
-        )
+        output::each_json_line(json, &self.file, free_volume, output::plain)
     }
 }
 
@@ -67,7 +61,8 @@ fn free_volume(value: Value) -> Result<Value> {
     let per_box: Vec<f64> = line
         .boxes
         .iter()
-        .map(|b| tetrahedron.map_or(0.0, |t| t.intersection_volume(b)))
+        // Adding 0 turns -0 into 0.
+        .map(|b| tetrahedron.map_or(0.0, |t| t.intersection_volume(b)) + 0.0)
         .collect();
     let occupied: f64 = per_box.iter().sum();
     let occupied_once = tetrahedron.map_or(0.0, |t| t.union_volume(&line.boxes));

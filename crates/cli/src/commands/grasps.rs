@@ -11,7 +11,7 @@ use crate::output::{self, Outcome};
 /// List, filter and convert grasps
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  prehend grasps out/grasps/human --object mug_classic --min-epsilon 0.1 --format csv"
+    after_help = "Example:\n  prehend grasps out/grasps/human --object coffee_mug --min-epsilon 0.1 --format csv"
 )]
 pub struct Arguments {
     /// Grasp tables (.parquet, .csv, .jsonl) or folders of them

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use nalgebra::Isometry3;
+use prehend::hand::{Hand, JointKind};
 use prehend::hand_folder::read_hand;
-use prehend_hand::{Hand, JointKind};
 use serde_json::{Map, Value, json};
 
 use crate::output::{self, Outcome, Usage};
@@ -32,8 +32,8 @@ impl Arguments {
         let hand = read_hand(&self.path)?;
         let mut facts = describe(&hand);
         if let Some(file) = &self.postures {
-            let run = |value: Result<Value>| Ok(json!({ "poses": poses(&hand, value?)? }));
-            return output::each(json, "line", output::json_lines(file)?, run, output::plain);
+            let run = |value: Value| Ok(json!({ "poses": poses(&hand, value)? }));
+            return output::each_json_line(json, file, run, output::plain);
         }
         if let Some(text) = &self.posture {
             let value = serde_json::from_str(text)
@@ -60,7 +60,7 @@ fn describe(hand: &Hand) -> Value {
             })
         })
         .collect();
-    let link = |i: &prehend_hand::LinkIdx| hand.link(*i).name.clone();
+    let link = |i: &prehend::hand::LinkIdx| hand.link(*i).name.clone();
     let free: Vec<_> = hand.free_joints().map(|j| hand.joint(j).name.clone()).collect();
     let fingers = hand.description().map_or(json!([]), |d| {
         json!(
@@ -117,7 +117,9 @@ fn poses(hand: &Hand, posture: Value) -> Result<Value> {
 pub fn pose_json(pose: &Isometry3<f64>) -> Value {
     let (t, q) = (pose.translation.vector, pose.rotation);
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-    json!({ "translation": [t.x, t.y, t.z], "quaternion_wxyz": [sign * q.w, sign * q.i, sign * q.j, sign * q.k] })
+    // Adding 0 turns -0 into 0.
+    let [w, x, y, z] = [q.w, q.i, q.j, q.k].map(|v| sign * v + 0.0);
+    json!({ "translation": [t.x, t.y, t.z], "quaternion_wxyz": [w, x, y, z] })
 }
 
 fn text(facts: &Value) -> String {

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
+use prehend::imitation::{Candidate, Scales, Similarity, Weighing, rank_grasps, rank_objects, recognise};
 use prehend::stages::imitate::features;
-use prehend_imitation::{Candidate, Scales, Similarity, Weighing, rank_grasps, rank_objects, recognise};
 use serde_json::{Map, Value, json};
 
 use super::grasps::read_tables;
@@ -15,7 +15,7 @@ use crate::output::{self, Outcome, Usage};
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  prehend imitate --demonstrator out/models/human/task-action.bin --imitator out/models/schunk_sdh/task-action.bin \\\n      \
---demonstration out/grasps/human/mug_classic.parquet:human/mug_classic/000012 --candidates out/grasps/schunk_sdh"
+--demonstration out/grasps/human/coffee_mug.parquet:human/coffee_mug/000012 --candidates out/grasps/schunk_sdh"
 )]
 pub struct Arguments {
     /// The demonstrator's model

@@ -9,8 +9,8 @@ use prehend::grasp_table::records;
 use prehend::labels::{LabelStore, Session};
 use prehend::stages::decompose::shape_of;
 use prehend::stages::label::{label, observe_all, tutor_object};
+use prehend::tutor::{Persona, TutorHand};
 use prehend::{ObjectOptions, files, hand_folder, run_record};
-use prehend_tutor::{Persona, TutorHand};
 use serde_json::{Value, json};
 
 use crate::output::{self, Outcome};
@@ -75,8 +75,7 @@ impl Arguments {
         let mut n_grasps: BTreeMap<String, usize> = BTreeMap::new();
         for path in &self.grasps {
             for file in files::list(path, &["parquet", "csv", "jsonl"])? {
-                self.one(&file, store.as_mut(), &mut counts, &mut n_grasps)
-                    .with_context(|| file.display().to_string())?;
+                self.one(&file, store.as_mut(), &mut counts, &mut n_grasps)?;
             }
         }
         let answer = json!({
@@ -97,19 +96,21 @@ impl Arguments {
         if frame.n_rows() == 0 {
             return Ok(());
         }
+        let name = || output::shown(file);
         let only = |column: &str| -> Result<String> {
-            let mut values = frame.texts(column)?;
+            let mut values = frame.texts(column).with_context(name)?;
             values.dedup();
             match values.as_slice() {
                 [one] => Ok(one.clone()),
                 _ => bail!(
-                    "column `{column}` has several values; label the tables of one hand and object at a time"
+                    "{}: column `{column}` has several values; label the tables of one hand and object at a time",
+                    name()
                 ),
             }
         };
         let hand = hand_folder::read_described_hand(Path::new(&only("hand_path")?))?;
         let shape = shape_of(Path::new(&only("mesh")?), ObjectOptions::default())?;
-        let grasps = records(&frame, &hand)?;
+        let grasps = records(&frame, &hand).with_context(name)?;
         let tutor_hand = TutorHand::new(&hand)?;
         let observations = observe_all(&tutor_hand, &tutor_object(&shape)?, &grasps);
         let labelled = label(&grasps, &observations, self.persona, self.seed, self.flip);

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use prehend_geometry::{OrientedBox, Shape, convex_hull, inspect, minimum_volume_box, repair, signed_volume};
+use prehend::geometry::{
+    OrientedBox, Shape, convex_hull, inspect, minimum_volume_box, repair, signed_volume,
+};
 use serde_json::{Value, json};
 
 use super::shape_input::{self, ShapeOptions};
@@ -41,12 +43,12 @@ fn facts(file: &Path, options: &ShapeOptions) -> Result<Value> {
     };
     // A flat cloud has no hull volume; that is a fact, not a failure.
     let hull_volume = convex_hull(points).map_or(0.0, |hull| hull.volume());
-    let bounding_box = minimum_volume_box(points).with_context(|| file.display().to_string())?;
+    let bounding_box = minimum_volume_box(points).with_context(|| output::shown(file))?;
     let welded = mesh.map(|m| repair(m.clone()).0);
     let report = welded.as_ref().map(inspect);
     let mut answer = json!({
-        "vertices": points.len(),
-        "triangles": mesh.map_or(0, prehend_geometry::TriMesh::n_triangles),
+        "vertices": input.n_vertices,
+        "triangles": input.n_triangles,
         "watertight": report.as_ref().is_some_and(|r| r.watertight),
         "volume": welded.as_ref().map_or(0.0, signed_volume).abs(),
         "hull_volume": hull_volume,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use prehend_model::Model;
+use prehend::model::Model;
 use serde_json::json;
 
 use crate::output::{self, Outcome};

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use prehend::ObjectOptions;
+use prehend::grasp::SynthesisOptions;
 use prehend::grasp_table::ContactRecord;
+use prehend::hand::Hand;
 use prehend::plan::{Planned, plan};
 use prehend::stages::decompose::shape_of;
 use prehend::stages::synthesize::HandData;
-use prehend_grasp::SynthesisOptions;
-use prehend_hand::Hand;
 use serde_json::{Value, json};
 
 use super::hand::pose_json;
@@ -20,7 +20,7 @@ use crate::output::{self, Outcome};
 /// Rank grasps of this hand on this object for this task
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  prehend plan --hand hands/schunk_sdh --object objects/mug/mug_classic.ply --task pouring \\\n      --model out/models/schunk_sdh/task-action.bin --top 5"
+    after_help = "Example:\n  prehend plan --hand hands/schunk_sdh --object objects/mug/coffee_mug.ply --task pouring \\\n      --model out/models/schunk_sdh/task-action.bin --top 5"
 )]
 pub struct Arguments {
     /// A folder with hand.toml and a URDF

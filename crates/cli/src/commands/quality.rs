@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::{Point3, UnitVector3, Vector3};
-use prehend_geometry::ContactPoint;
-use prehend_quality::{Contact, LengthUnit, Norm, QualityOptions, grasp_quality};
+use prehend::geometry::ContactPoint;
+use prehend::quality::{Contact, LengthUnit, Norm, QualityOptions, grasp_quality};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -18,7 +18,8 @@ use crate::output::{self, Outcome};
 {\"point\":[-0.05,0,0],\"normal\":[1,0,0],\"mu\":1,\"torsion\":0.002}]}' | prehend quality - --json"
 )]
 pub struct Arguments {
-    /// JSON lines: center, torque_scale, contacts, and options; - is standard input
+    /// JSON lines: center, torque_scale, contacts, and options; - is standard input. Every length is in "length_unit",
+    /// "m" or "mm"
     file: PathBuf,
 
     /// Also the volume of the grasp wrench space (builds the whole hull)
@@ -53,10 +54,11 @@ struct ContactLine {
 }
 
 #[derive(Deserialize, Default)]
-#[serde(rename_all = "lowercase")]
 enum NormName {
     #[default]
+    #[serde(rename = "l1", alias = "L1")]
     L1,
+    #[serde(rename = "linf", alias = "Linf", alias = "LInf")]
     Linf,
 }
 
@@ -75,13 +77,7 @@ fn eight() -> usize {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        output::each(
-            json,
-            "line",
-            output::json_lines(&self.file)?,
-            |v| quality(v?, self.volume),
-            output::plain,
-        )
+        output::each_json_line(json, &self.file, |v| quality(v, self.volume), output::plain)
     }
 }
 

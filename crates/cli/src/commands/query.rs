@@ -1,11 +1,11 @@
 //! `prehend query MODEL --target NODE`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use prehend::frame::Frame;
+use prehend::model::{Evidence, Model, ModelError};
 use prehend::training::to_table;
-use prehend_model::{Evidence, Model};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -30,7 +30,8 @@ pub struct Arguments {
     #[arg(long)]
     evidence: Option<String>,
 
-    /// A table (CSV, Parquet, JSON lines); one answer a row, columns that belong to no node are ignored
+    /// A table (CSV, Parquet, JSON lines); one answer a row, with `line` counting rows from 1; columns that belong to no
+    /// node are ignored, empty cells are not observed
     #[arg(long, conflicts_with = "evidence")]
     evidence_file: Option<PathBuf>,
 
@@ -84,9 +85,9 @@ impl Arguments {
             None => Vec::new(),
         };
         if let Some(file) = &self.queries {
-            let run = |line: Result<Value>| {
+            let run = |line: Value| {
                 let question: Question =
-                    serde_json::from_value(line?).context("expected evidence, target and at")?;
+                    serde_json::from_value(line).context("expected evidence, target and at")?;
                 let evidence = Evidence::from_json(&model, &or_empty(question.evidence))?;
                 let targets = match question.target {
                     Some(Targets::One(name)) => name.split(',').map(str::to_owned).collect(),
@@ -96,20 +97,20 @@ impl Arguments {
                 let at = if question.at.is_empty() { &at } else { &question.at };
                 self.ask(&model, &targets, &evidence, at)
             };
-            return output::each(json, "line", output::json_lines(file)?, run, output::plain);
+            return output::each_json_line(json, file, run, output::plain);
         }
         if let Some(file) = &self.evidence_file {
-            let rows = evidence_rows(&model, file)?
-                .into_iter()
-                .enumerate()
-                .map(|(i, e)| (json!(i + 1), e));
-            return output::each(
-                json,
-                "line",
-                rows,
-                |e| self.ask(&model, &self.target, &e, &at),
-                output::plain,
-            );
+            let frame = Frame::read(file)?;
+            let rows = (0..frame.n_rows()).map(|row| (json!(row + 1), row));
+            // Row by row, so that a cell that is no value of its node fails one answer and not all.
+            let run = |row: usize| {
+                let table = to_table(&frame.select(&[row]))?;
+                let answers = Evidence::from_table(&model, &table)
+                    .map_err(without_row)
+                    .and_then(|rows| self.ask(&model, &self.target, &rows[0], &at));
+                answers.with_context(|| format!("{}, row {}", output::shown(file), row + 1))
+            };
+            return output::each(json, "line", rows, run, output::plain);
         }
         let evidence = match &self.evidence {
             Some(text) => {
@@ -141,14 +142,9 @@ impl Arguments {
                     bail!(Usage(format!("--prior: found {value}, expected a JSON object")))
                 };
                 nodes.iter().try_fold(model, |model, (node, states)| {
-                    let prior: Vec<f64> = model
-                        .node(model.index(node)?)
-                        .states()
-                        .iter()
-                        .map(|s| states.get(s).and_then(Value::as_f64).unwrap_or(0.0))
-                        .collect();
-                    let total: f64 = prior.iter().sum();
-                    Ok(model.with_prior(node, &prior.iter().map(|p| p / total).collect::<Vec<_>>())?)
+                    let known = model.node(model.index(node)?).states().to_vec();
+                    let prior = weights(node, states, &known)?;
+                    Ok(model.with_prior(node, &prior)?)
                 })
             }
         }
@@ -181,7 +177,43 @@ fn or_empty(value: Value) -> Value {
     if value.is_null() { json!({}) } else { value }
 }
 
-fn evidence_rows(model: &Model, file: &Path) -> Result<Vec<Evidence>> {
-    let table = to_table(&Frame::read(file)?)?;
-    Evidence::from_table(model, &table).with_context(|| file.display().to_string())
+/// The weights that `--prior` gives to a node's states, scaled to sum 1; a state left out has 0.
+fn weights(node: &str, states: &Value, known: &[String]) -> Result<Vec<f64>> {
+    let Value::Object(given) = states else {
+        bail!(Usage(format!(
+            "--prior: `{node}`: found {states}, expected '{{\"STATE\": p}}'"
+        )))
+    };
+    if let Some(state) = given.keys().find(|s| !known.contains(s)) {
+        bail!(
+            "--prior: `{node}` has no state `{state}`; its states are {}",
+            known.join(", ")
+        );
+    }
+    let weight = |state: &String| match given.get(state) {
+        None => Ok(0.0),
+        Some(value) => match value.as_f64() {
+            Some(w) if w.is_finite() && w >= 0.0 => Ok(w),
+            _ => bail!("--prior: `{node}`, `{state}`: found {value}, expected a number, 0 or more"),
+        },
+    };
+    let weights = known.iter().map(weight).collect::<Result<Vec<f64>>>()?;
+    let total: f64 = weights.iter().sum();
+    if total <= 0.0 || !total.is_finite() {
+        bail!("--prior: `{node}`: the numbers sum to {total}; give at least one state a positive number");
+    }
+    Ok(weights.iter().map(|w| w / total).collect())
+}
+
+/// A cell's error would say its row in the one-row table that the model saw; the user's row stands before it.
+fn without_row(error: ModelError) -> anyhow::Error {
+    match error {
+        ModelError::Cell {
+            column,
+            found,
+            expected,
+            ..
+        } => anyhow::anyhow!("column `{column}`: found {found}, expected {expected}"),
+        other => other.into(),
+    }
 }

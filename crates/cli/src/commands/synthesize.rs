@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use prehend::ObjectOptions;
+use prehend::frame::Frame;
+use prehend::grasp::SynthesisOptions;
 use prehend::run_record::timed;
 use prehend::stages::decompose::shape_of;
 use prehend::stages::synthesize::{HandData, grasp};
-use prehend_grasp::SynthesisOptions;
 use serde_json::{Value, json};
 
 use crate::bars::Bars;
@@ -16,7 +17,7 @@ use crate::output::{self, Outcome};
 /// Plan and close grasps of a hand on an object
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  prehend synthesize --hand hands/schunk_sdh --object objects/mug/mug_classic.ply --tries 500 --out grasps.parquet"
+    after_help = "Example:\n  prehend synthesize --hand hands/schunk_sdh --object objects/mug/coffee_mug.ply --tries 500 --out grasps.parquet"
 )]
 pub struct Arguments {
     /// A folder with hand.toml and a URDF
@@ -50,6 +51,9 @@ pub struct Arguments {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
+        if let Some(out) = &self.out {
+            Frame::check_name(out)?;
+        }
         let hand = HandData::read(&self.hand)?;
         let shape = shape_of(&self.object, ObjectOptions { as_is: self.as_is })?;
         let options = SynthesisOptions {

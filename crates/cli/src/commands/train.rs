@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use prehend::frame::Frame;
 use prehend::labels::LabelStore;
+use prehend::model::{ModelError, TrainOptions, TrainReport, Trained};
 use prehend::stages::learn::{NamedNetwork, write_model};
 use prehend::training::{balanced_rows, labelled_copies, to_table};
-use prehend_model::{TrainOptions, TrainReport, Trained};
 use serde_json::{Value, json};
 
 use super::grasps::read_tables;
@@ -78,6 +78,14 @@ impl Arguments {
                 );
             }
             frame = labelled_copies(&frame, &answers)?;
+        } else if frame.column("task").is_none()
+            && frame.column("grasp_id").is_some()
+            && asks_for_task(&network)
+        {
+            bail!(
+                "these are grasp tables without a column `task`, which the network's node `task` needs; \
+                 give --labels out/labels.sqlite, or make labels with `prehend label`"
+            );
         }
         let (kept, held_out) = self.split(&frame)?;
         let rows = match &self.balance {
@@ -99,7 +107,8 @@ impl Arguments {
             group: self.group.clone(),
             ..TrainOptions::default()
         };
-        let Trained { model, report } = prehend_model::train(&network.network, &to_table(&rows)?, &options)?;
+        let Trained { model, report } =
+            prehend::model::train(&network.network, &to_table(&rows)?, &options).map_err(counted_from_one)?;
         let held_out_likelihood = if held_out.n_rows() == 0 {
             None
         } else {
@@ -144,11 +153,31 @@ impl Arguments {
     }
 }
 
+fn asks_for_task(network: &NamedNetwork) -> bool {
+    network.network.nodes().iter().any(|node| node.name == "task")
+}
+
+/// A cell's error with its row as a person counts.
+fn counted_from_one(error: ModelError) -> anyhow::Error {
+    match error {
+        ModelError::Cell {
+            column,
+            row,
+            found,
+            expected,
+        } => anyhow::anyhow!(
+            "column `{column}`, row {} of those to learn from (counted from 1): found {found}, expected {expected}",
+            row + 1
+        ),
+        other => other.into(),
+    }
+}
+
 /// Per continuous node: components chosen, BIC of each number tried, and EM steps, one entry a configuration.
 fn node_facts(report: &TrainReport) -> Value {
     let facts = report.nodes.iter().filter(|n| !n.cells.is_empty()).map(|node| {
-        let each = |f: &dyn Fn(&prehend_model::CellReport) -> Value| Value::Array(node.cells.iter().map(f).collect());
-        let curve = |c: &prehend_model::CellReport| {
+        let each = |f: &dyn Fn(&prehend::model::CellReport) -> Value| Value::Array(node.cells.iter().map(f).collect());
+        let curve = |c: &prehend::model::CellReport| {
             json!(c.curve.iter().map(|o| json!({ "components": o.components, "bic": o.bic })).collect::<Vec<_>>())
         };
         let facts = json!({
