@@ -1,0 +1,382 @@
+//! `query`, `train`, `model convert`, `plan` and `imitate`: on a model written by hand, and on a small chain of grasps.
+
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+use serde_json::{Value, json};
+
+mod common;
+
+use common::{assert_close, keys, number, prehend, put};
+
+/// The example of the model format: pouring has a mixture of two.
+const MODEL: &str = r#"{ "format": "prehend-model", "version": 1,
+  "nodes": [
+    { "name": "task", "kind": "discrete", "states": ["hand-over", "pouring"], "parents": [], "table": [[0.4, 0.6]] },
+    { "name": "size", "kind": "gaussian_mixture", "columns": ["size_x", "size_y"],
+      "discrete_parents": ["task"], "continuous_parents": [],
+      "components": [
+        [ { "weight": 1.0, "mean": [0.1, 0.2], "coefficients": [[], []], "covariance": [[1.0, 0.0], [0.0, 1.0]] } ],
+        [ { "weight": 0.3, "mean": [0.0, 0.0], "coefficients": [[], []], "covariance": [[1.0, 0.0], [0.0, 1.0]] },
+          { "weight": 0.7, "mean": [2.0, 1.0], "coefficients": [[], []], "covariance": [[0.5, 0.1], [0.1, 0.5]] } ] ] } ] }"#;
+
+/// Densities of `size` at the origin given hand-over and pouring. The second component of pouring has determinant 0.24
+/// and Mahalanobis distance 8.75 there.
+fn densities_at_origin() -> [f64; 2] {
+    let unit = 1.0 / (2.0 * PI);
+    let far = (-8.75_f64 / 2.0).exp() / (2.0 * PI * 0.24_f64.sqrt());
+    [unit * (-0.025_f64).exp(), 0.3 * unit + 0.7 * far]
+}
+
+#[test]
+fn a_posterior_is_prior_times_likelihood() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = put(folder.path(), "m.json", MODEL);
+    let [over, pouring] = densities_at_origin();
+    let evidence = 0.4 * over + 0.6 * pouring;
+    let arguments = [
+        "query",
+        &model,
+        "--target",
+        "task",
+        "--evidence",
+        r#"{"size":[0,0]}"#,
+        "--json",
+    ];
+    let answer = prehend(&arguments, "").answer();
+    assert_eq!(keys(&answer), ["log_evidence", "posterior"]);
+    assert_close(&answer["log_evidence"], evidence.ln());
+    assert_close(&answer["posterior"]["hand-over"], 0.4 * over / evidence);
+
+    let uniform = prehend(&[&arguments[..], &["--prior", "uniform"]].concat(), "").answer();
+    assert_close(&uniform["posterior"]["hand-over"], over / (over + pouring));
+    let told = prehend(
+        &[
+            &arguments[..],
+            &["--prior", r#"{"task":{"pouring":3,"hand-over":1}}"#],
+        ]
+        .concat(),
+        "",
+    );
+    assert_close(
+        &told.answer()["posterior"]["hand-over"],
+        over / (over + 3.0 * pouring),
+    );
+    let explained = prehend(&[&arguments[..], &["--explain", "--mpe"]].concat(), "").answer();
+    assert_eq!(explained["mpe"]["states"]["task"], json!("hand-over"));
+    let against = &explained["explanation"]["against"]["pouring"];
+    assert_close(&against["contributions"]["size"], (over / pouring).ln());
+    assert_close(&against["prior"], (0.4_f64 / 0.6).ln());
+}
+
+#[test]
+fn a_continuous_answer_is_a_mixture_with_densities_where_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = put(folder.path(), "m.json", MODEL);
+    let arguments = [
+        "query",
+        &model,
+        "--target",
+        "size",
+        "--evidence",
+        r#"{"task":"pouring"}"#,
+        "--at",
+        "[[0,0]]",
+        "--json",
+    ];
+    let answer = prehend(&arguments, "").answer();
+    assert_eq!(
+        keys(&answer),
+        ["components", "covariance", "log_density", "log_evidence", "mean"]
+    );
+    assert_close(&answer["mean"][0], 1.4);
+    assert_close(&answer["mean"][1], 0.7);
+    // Within 0.3 · 1 + 0.7 · 0.5, between 0.3 · 0.7 · 2².
+    assert_close(&answer["covariance"][0][0], 0.65 + 0.84);
+    assert_close(&answer["log_density"][0], densities_at_origin()[1].ln());
+    assert_close(&answer["log_evidence"], 0.6_f64.ln());
+    let joint = prehend(&["query", &model, "--target", "task,size", "--json"], "").answer();
+    assert_close(&joint["targets"]["size"]["mean"][0], 0.4 * 0.1 + 0.6 * 1.4);
+}
+
+#[test]
+fn many_questions_are_answered_in_order_and_a_bad_one_in_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = put(folder.path(), "m.json", MODEL);
+    let [over, pouring] = densities_at_origin();
+    let posterior = 0.4 * over / (0.4 * over + 0.6 * pouring);
+
+    let table = put(
+        folder.path(),
+        "e.csv",
+        "size_x,size_y,other\n0,0,a\n,,b\nfoo,0,c\n0,0,d\n",
+    );
+    let run = prehend(
+        &[
+            "query",
+            &model,
+            "--target",
+            "task",
+            "--evidence-file",
+            &table,
+            "--json",
+        ],
+        "",
+    );
+    assert_eq!(run.status, 1);
+    let lines = run.lines();
+    assert_close(&lines[0]["posterior"]["hand-over"], posterior);
+    assert_close(&lines[1]["posterior"]["hand-over"], 0.4);
+    let error = lines[2]["error"].as_str().unwrap();
+    assert!(error.contains("row 3: column `size_x`: found `foo`"), "{error}");
+    assert_eq!(lines[2]["line"], json!(3));
+    assert_close(&lines[3]["posterior"]["hand-over"], posterior);
+
+    let questions = "{\"evidence\":{\"size\":[0,0]},\"target\":\"task\"}\n{\"evidence\":{\"weight\":1},\"target\":\"task\"}\n\
+                     {\"target\":\"size\",\"at\":[[0,0],[1,1]]}\n";
+    let run = prehend(&["query", &model, "--queries", "-", "--json"], questions);
+    assert_eq!(run.status, 1);
+    let lines = run.lines();
+    assert_close(&lines[0]["posterior"]["hand-over"], posterior);
+    assert!(
+        lines[1]["error"]
+            .as_str()
+            .unwrap()
+            .contains("no node `weight`; its nodes are `task`, `size`")
+    );
+    assert_eq!(lines[2]["log_density"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_line_is_learned_and_its_model_survives_the_way_to_binary_and_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let network = put(
+        folder.path(),
+        "line.toml",
+        "[[node]]\nname = \"kind\"\nkind = \"discrete\"\nstates = [\"x\", \"y\"]\n\
+         [[node]]\nname = \"a\"\nkind = \"gaussian_mixture\"\nparents = [\"kind\"]\nmixture = { components = 1 }\n\
+         [[node]]\nname = \"b\"\nkind = \"gaussian_mixture\"\nparents = [\"a\"]\nmixture = { components = 1 }\n",
+    );
+    // b = 2 a + 1 ± 0.1, the deviation with sum and slope zero over each four rows.
+    let mut table = String::from("kind,a,b,object\n");
+    for i in 0..80 {
+        let a = f64::from(i / 4) * 0.1;
+        let b = 2.0 * a + 1.0 + if i % 2 == 0 { 0.1 } else { -0.1 };
+        let kind = if i % 4 < 2 { "x" } else { "y" };
+        writeln!(table, "{kind},{a},{b},o{}", i / 40).unwrap();
+    }
+    let out = folder.path().join("models");
+    let out = out.to_str().unwrap();
+    let arguments = ["train", "-", "--network", &network, "--out", out, "--json"];
+    let answer = prehend(&arguments, &table).answer();
+    assert_eq!(answer["rows"], json!(80));
+    assert!(answer["holdout_log_likelihood"].is_null());
+    for node in ["a", "b"] {
+        for key in ["components", "bic", "steps"] {
+            assert!(answer["nodes"][node][key].is_array(), "{node} {key}");
+        }
+    }
+    assert_eq!(answer["nodes"]["b"]["components"], json!([1]));
+    assert_eq!(answer["nodes"]["a"]["components"], json!([1, 1]));
+
+    let model = format!("{out}/line.json");
+    let asked = prehend(
+        &[
+            "query",
+            &model,
+            "--target",
+            "b",
+            "--evidence",
+            r#"{"a":1.5}"#,
+            "--json",
+        ],
+        "",
+    )
+    .answer();
+    assert!((number(&asked["mean"][0]) - 4.0).abs() < 1e-3, "{asked}");
+    assert!(
+        (number(&asked["covariance"][0][0]) - 0.01).abs() < 1e-3,
+        "{asked}"
+    );
+
+    let (binary, back) = (format!("{out}/other.bin"), format!("{out}/back.json"));
+    prehend(&["model", "convert", &model, &binary, "--json"], "").answer();
+    prehend(&["model", "convert", &binary, &back, "--json"], "").answer();
+    assert_eq!(std::fs::read(&model).unwrap(), std::fs::read(&back).unwrap());
+
+    let held = prehend(&[&arguments[..], &["--holdout", "o1"]].concat(), &table).answer();
+    assert_eq!((&held["rows"], &held["holdout_rows"]), (&json!(40), &json!(40)));
+    assert!(held["holdout_log_likelihood"].is_number());
+}
+
+#[test]
+fn grasps_become_labels_a_model_a_plan_and_an_imitation() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let hand = "hands/schunk_sdh";
+    let mut tables = Vec::new();
+    for (object, name) in [
+        ("objects/mug/coffee_mug.ply", "mug"),
+        ("objects/hammer/claw_hammer.ply", "hammer"),
+    ] {
+        let table = file(&format!("{name}.parquet"));
+        prehend(
+            &[
+                "synthesize",
+                "--hand",
+                hand,
+                "--object",
+                object,
+                "--tries",
+                "150",
+                "--out",
+                &table,
+                "--json",
+            ],
+            "",
+        )
+        .answer();
+        tables.push(table);
+    }
+    let labels = file("labels.sqlite");
+    prehend(
+        &[
+            "label",
+            &tables[0],
+            &tables[1],
+            "--persona",
+            "lenient",
+            "--out",
+            &labels,
+            "--json",
+        ],
+        "",
+    )
+    .answer();
+    let network = put(
+        folder.path(),
+        "small.toml",
+        "[[node]]\nname = \"task\"\nkind = \"discrete\"\nstates = [\"hand-over\", \"pouring\", \"tool-use\"]\n\
+         [[node]]\nname = \"size\"\nkind = \"gaussian_mixture\"\ncolumns = [\"size_x\", \"size_y\", \"size_z\"]\nparents = [\"task\"]\n\
+         mixture = { components = 1 }\nnoise_floor = 0.01\n\
+         [[node]]\nname = \"fvol\"\nkind = \"gaussian_mixture\"\nparents = [\"task\"]\nmixture = { components = 1 }\nnoise_floor = 0.05\n",
+    );
+    let out = file("models");
+    let without = prehend(&["train", &tables[0], "--network", &network, "--json"], "");
+    assert_eq!(without.status, 1);
+    assert!(without.stderr.contains("--labels"), "{}", without.stderr);
+    prehend(
+        &[
+            "train",
+            &tables[0],
+            &tables[1],
+            "--network",
+            &network,
+            "--labels",
+            &labels,
+            "--persona",
+            "lenient",
+            "--out",
+            &out,
+            "--json",
+        ],
+        "",
+    )
+    .answer();
+    let model = format!("{out}/small.bin");
+
+    let arguments = [
+        "plan",
+        "--hand",
+        hand,
+        "--object",
+        "objects/mug/coffee_mug.ply",
+        "--task",
+        "pouring",
+        "--model",
+        &model,
+    ];
+    let plan = prehend(
+        &[&arguments[..], &["--tries", "100", "--top", "3", "--json"]].concat(),
+        "",
+    )
+    .answer();
+    let grasps = plan["grasps"].as_array().unwrap();
+    assert_eq!(grasps.len(), 3);
+    assert_eq!(
+        keys(&grasps[0]),
+        [
+            "contacts", "epsilon", "grasp_id", "joints", "p_task", "pose", "pregrasp"
+        ]
+    );
+    let p: Vec<f64> = grasps.iter().map(|g| number(&g["p_task"])).collect();
+    assert!(p[0] >= p[1] && p[1] >= p[2] && p[0] <= 1.0, "{p:?}");
+    let none = prehend(
+        &[
+            &arguments[..],
+            &["--tries", "2", "--support-plane", "1", "--json"],
+        ]
+        .concat(),
+        "",
+    )
+    .answer();
+    assert_eq!(none["grasps"], json!([]));
+    assert!(none["reason"].as_str().unwrap().contains("none of 2 tries"));
+
+    let first: Value = prehend(&["grasps", &tables[0], "--limit", "1", "--json"], "").answer();
+    let demonstration = format!("{}:{}", tables[0], first["grasp_id"].as_str().unwrap());
+    let imitation = prehend(
+        &[
+            "imitate",
+            "--demonstrator",
+            &model,
+            "--imitator",
+            &model,
+            "--demonstration",
+            &demonstration,
+            "--candidates",
+            &tables[0],
+            &tables[1],
+            "--top",
+            "5",
+            "--json",
+        ],
+        "",
+    )
+    .answer();
+    let posterior = imitation["task"]["posterior"].as_object().unwrap();
+    assert!((posterior.values().map(number).sum::<f64>() - 1.0).abs() < 1e-9);
+    assert_eq!(imitation["objects"].as_array().unwrap().len(), 2);
+    assert_eq!(
+        keys(&imitation["objects"][0]),
+        ["object", "p_task", "similarity", "similarity_raw", "total"]
+    );
+    assert_eq!(
+        imitation["objects"][0]["object"],
+        json!("coffee_mug"),
+        "the object that was shown is the likest"
+    );
+    let grasps = imitation["grasps"].as_array().unwrap();
+    assert_eq!(grasps.len(), 5);
+    assert_eq!(
+        keys(&grasps[0]),
+        [
+            "grasp_id",
+            "object",
+            "p_task",
+            "similarity",
+            "similarity_raw",
+            "total"
+        ]
+    );
+    assert_eq!(
+        grasps[0]["grasp_id"], first["grasp_id"],
+        "the grasp that was shown is the likest"
+    );
+    for g in grasps {
+        assert_close(
+            &g["total"],
+            0.8 * number(&g["p_task"]) + 0.2 * number(&g["similarity"]),
+        );
+    }
+}
