@@ -83,7 +83,7 @@ fn hands_of_others_are_read_as_they_are() {
     }
     for (file, dof) in [
         ("allegro_hand/allegro_hand_right.urdf", 16),
-        ("barrett_hand/bhand_model.urdf", 4),
+        ("barrett_hand/bhand_model.urdf", 8),
         ("panda_gripper/panda_gripper.urdf", 1),
         ("schunk_sdh/schunk_sdh.urdf", 7),
     ] {

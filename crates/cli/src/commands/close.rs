@@ -20,7 +20,8 @@ use crate::output::{self, Outcome};
 /// Close a user's own grasp candidates
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  echo '{\"pose\":{\"translation\":[0,0,0.25],\"quaternion_wxyz\":[0,1,0,0]},\"joints\":{},\"approach\":true}' \\\n      | prehend close --hand hands/schunk_sdh --object objects/mug/coffee_mug.ply - --json"
+    after_help = "Example:\n  echo '{\"pose\":{\"translation\":[0,0,0.33],\"quaternion_wxyz\":[0,1,0,0]},\"joints\":{\"spread\":0.5,\"finger_1_proximal_joint\":-0.6,\
+\"finger_2_proximal_joint\":-0.6,\"thumb_proximal_joint\":-0.6},\"approach\":true}' \\\n      | prehend close --hand hands/schunk_sdh --object objects/mug/coffee_mug.ply - --json"
 )]
 pub struct Arguments {
     /// A folder with hand.toml and a URDF

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use prehend::frame::{Column, Frame};
 use serde_json::{Map, Value, json};
 
@@ -56,7 +56,7 @@ enum Format {
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
         let frame = read_tables(&self.files)?;
-        let rows = self.matching(&frame)?;
+        let rows = self.matching(&frame).with_context(|| listed(&self.files))?;
         let chosen = frame.select(&rows);
         if let Some(out) = &self.out {
             chosen.write(out)?;
@@ -102,6 +102,15 @@ impl Arguments {
     }
 }
 
+/// Paths as messages name them.
+pub fn listed(paths: &[PathBuf]) -> String {
+    paths
+        .iter()
+        .map(|p| output::shown(p))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
 /// All tables of these files and folders as one; columns that not all have are dropped.
 pub fn read_tables(paths: &[PathBuf]) -> Result<Frame> {
     let mut whole = Frame::new();
@@ -113,7 +122,10 @@ pub fn read_tables(paths: &[PathBuf]) -> Result<Frame> {
         }
     }
     if found == 0 {
-        bail!("no tables found; expected .parquet, .csv or .jsonl files, or folders that hold some");
+        bail!(
+            "{}: no tables found; expected .parquet, .csv or .jsonl files, or folders that hold some",
+            listed(paths)
+        );
     }
     Ok(whole)
 }

@@ -7,15 +7,15 @@ use prehend::imitation::{Candidate, Scales, Similarity, Weighing, rank_grasps, r
 use prehend::stages::imitate::features;
 use serde_json::{Map, Value, json};
 
-use super::grasps::read_tables;
+use super::grasps::{listed, read_tables};
 use super::model::read_model;
 use crate::output::{self, Outcome, Usage};
 
 /// Choose object and grasp that best imitate a demonstration
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  prehend imitate --demonstrator out/models/human/task-action.bin --imitator out/models/schunk_sdh/task-action.bin \\\n      \
---demonstration out/grasps/human/coffee_mug.parquet:human/coffee_mug/000012 --candidates out/grasps/schunk_sdh"
+    after_help = "Example:\n  F=out/grasps/human/camping_cup.parquet\n  prehend imitate --demonstrator out/models/human/task-action.bin --imitator out/models/schunk_sdh/task-action.bin \\\n      \
+--demonstration $F:$(prehend grasps $F --limit 1 --format csv | tail -1 | cut -d, -f1) --candidates out/grasps/schunk_sdh"
 )]
 pub struct Arguments {
     /// The demonstrator's model
@@ -69,10 +69,10 @@ impl Arguments {
             .position(|id| id == grasp_id);
         let row = row
             .with_context(|| format!("{file}: no grasp `{grasp_id}`; `prehend grasps {file}` lists them"))?;
-        let shown = features(&shown_table)?[row];
+        let shown = features(&shown_table).with_context(|| file.to_owned())?[row];
 
         let table = read_tables(&self.candidates)?;
-        let all = features(&table)?;
+        let all = features(&table).with_context(|| listed(&self.candidates))?;
         let (ids, names) = (table.texts("grasp_id")?, table.texts("object")?);
         let candidates: Vec<Candidate> = (0..table.n_rows())
             .map(|r| Candidate {

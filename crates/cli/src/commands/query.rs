@@ -16,7 +16,7 @@ use crate::output::{self, Outcome, Usage};
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  prehend query out/models/human/task-action.bin --target task --evidence '{\"size\":[0.11,0.08,0.1],\"cvex\":1.3}'\n\
-  prehend query model.json --target upos --evidence '{\"task\":\"pouring\"}' --at '[[1,0,0],[0,0,1]]'"
+  prehend query out/models/human/task-action.json --target upos --evidence '{\"task\":\"pouring\"}' --at '[[1,0,0],[0,0,1]]'"
 )]
 pub struct Arguments {
     /// A model (.bin or .json)

@@ -10,7 +10,7 @@ use prehend::stages::learn::{NamedNetwork, write_model};
 use prehend::training::{balanced_rows, labelled_copies, to_table};
 use serde_json::{Value, json};
 
-use super::grasps::read_tables;
+use super::grasps::{listed, read_tables};
 use crate::output::{self, Outcome, Usage};
 
 /// Learn a network from tables
@@ -107,8 +107,8 @@ impl Arguments {
             group: self.group.clone(),
             ..TrainOptions::default()
         };
-        let Trained { model, report } =
-            prehend::model::train(&network.network, &to_table(&rows)?, &options).map_err(counted_from_one)?;
+        let Trained { model, report } = prehend::model::train(&network.network, &to_table(&rows)?, &options)
+            .map_err(|e| counted_from_one(e).context(listed(&self.data)))?;
         let held_out_likelihood = if held_out.n_rows() == 0 {
             None
         } else {
