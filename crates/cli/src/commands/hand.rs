@@ -102,8 +102,8 @@ fn describe(hand: &Hand) -> Value {
 }
 
 fn poses(hand: &Hand, posture: Value) -> Result<Value> {
-    let posture: BTreeMap<String, f64> =
-        serde_json::from_value(posture).context("a posture is an object from joint names to numbers")?;
+    let posture: BTreeMap<String, f64> = serde_json::from_value(posture)
+        .context("expected a posture: an object from joint names to numbers (rad, m)")?;
     let poses = hand.link_poses(&hand.positions(&posture)?);
     let named = hand
         .links()

@@ -64,7 +64,8 @@ impl Arguments {
         };
         let shown_table = read_tables(&[PathBuf::from(file)])?;
         let row = shown_table
-            .texts("grasp_id")?
+            .texts("grasp_id")
+            .with_context(|| file.to_owned())?
             .iter()
             .position(|id| id == grasp_id);
         let row = row
