@@ -161,3 +161,78 @@ impl Experiments {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::ObjectOptions;
+
+    fn bundled(names: &[&str]) -> Vec<Object> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../objects");
+        names
+            .iter()
+            .map(|n| Object::read(&folder.join(n).with_extension("ply"), ObjectOptions::default()).unwrap())
+            .collect()
+    }
+
+    fn hands() -> Vec<String> {
+        vec!["human".into(), "schunk_sdh".into()]
+    }
+
+    #[test]
+    fn the_last_of_a_type_is_held_out_and_a_lone_one_is_not() {
+        let objects = bundled(&["glass/tumbler", "mug/camping_cup", "mug/coffee_mug"]);
+        let derived = Experiments::derive(&objects, &hands()).unwrap();
+        assert_eq!(derived.a.held_out, ["coffee_mug"]);
+        assert_eq!(derived.b.folds, [["coffee_mug"]]);
+        assert_eq!(
+            (derived.demonstrator.as_str(), derived.imitator.as_str()),
+            ("human", "schunk_sdh")
+        );
+        assert_eq!(
+            (derived.c.demonstration.as_str(), derived.c.task.as_str()),
+            ("camping_cup", "pouring")
+        );
+        assert_eq!(derived.c.candidates, ["tumbler", "coffee_mug"]);
+    }
+
+    #[test]
+    fn without_a_vessel_the_demonstration_shows_the_use_of_a_tool() {
+        let objects = bundled(&["hammer/ball_hammer"]);
+        let derived = Experiments::derive(&objects, &hands()[1..]).unwrap();
+        assert_eq!(derived.c.task, "tool-use");
+        assert!(
+            derived.a.held_out.is_empty() && derived.b.folds.is_empty() && derived.c.candidates.is_empty()
+        );
+        assert_eq!(derived.demonstrator, derived.imitator);
+    }
+
+    #[test]
+    fn what_is_written_reads_back_and_unknown_names_are_named() {
+        let objects = bundled(&["mug/camping_cup", "mug/coffee_mug"]);
+        let derived = Experiments::derive(&objects, &hands()).unwrap();
+        let text = toml::to_string(&derived).unwrap();
+        assert_eq!(Experiments::parse(&text, &objects, &hands()).unwrap(), derived);
+        let message = |from: &str, to: &str| {
+            let changed = text.replace(from, to);
+            assert_ne!(changed, text);
+            Experiments::parse(&changed, &objects, &hands())
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            message("imitator = \"schunk_sdh\"", "imitator = \"claw\""),
+            "imitator = \"claw\": no such hand; there are human, schunk_sdh"
+        );
+        assert_eq!(
+            message("demonstration = \"camping_cup\"", "demonstration = \"jar\""),
+            "c.demonstration: no object `jar`; there are camping_cup, coffee_mug"
+        );
+        assert_eq!(
+            message("lambda = 0.8", "lambda = 8.0"),
+            "c.lambda = 8: expected a number from 0 to 1"
+        );
+    }
+}

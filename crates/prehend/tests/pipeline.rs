@@ -9,7 +9,12 @@ use nalgebra::Point3;
 use prehend::frame::Frame;
 use prehend::grasp_table::records;
 use prehend::hand_folder::read_described_hand;
-use prehend::{Error, files};
+use prehend::plan::plan;
+use prehend::progress::unwatched;
+use prehend::stages::decompose::shape_of;
+use prehend::{Error, ObjectOptions, files};
+use prehend_grasp::SynthesisOptions;
+use prehend_model::Model;
 use prehend_quality::{Contact, QualityOptions, grasp_quality};
 
 #[test]
@@ -127,4 +132,38 @@ fn from_its_row_a_grasp_is_rebuilt_exactly() {
         }
     }
     assert!(n_contacts > 50, "only {n_contacts} contacts were looked at");
+}
+
+#[test]
+fn a_plan_ranks_grasps_by_the_probability_of_the_task() {
+    let bytes = files::read(&BASELINE.path().join("one/models/schunk_sdh/task-action.bin")).unwrap();
+    let model = Model::from_bytes(&bytes).unwrap();
+    let hand = read_described_hand(&repository("hands/schunk_sdh")).unwrap();
+    let glass = shape_of(&repository("objects/glass/tumbler.ply"), ObjectOptions::default()).unwrap();
+    let options = SynthesisOptions {
+        tries: 60,
+        seed: 3,
+        ..SynthesisOptions::default()
+    };
+    let answer = plan(&hand, &glass, "pouring", &model, 5, &options, unwatched()).unwrap();
+    assert!(answer.kept >= answer.grasps.len() && answer.tried == 60);
+    assert!(!answer.grasps.is_empty() && answer.grasps.len() <= 5);
+    assert!(answer.reason.is_none());
+    let p: Vec<f64> = answer.grasps.iter().map(|g| g.p_task).collect();
+    assert!(
+        p.iter().all(|p| (0.0..=1.0).contains(p)) && p.is_sorted_by(|a, b| a >= b),
+        "{p:?}"
+    );
+
+    let unknown = plan(&hand, &glass, "juggling", &model, 5, &options, unwatched()).unwrap_err();
+    assert_eq!(
+        unknown.to_string(),
+        "the model knows no task `juggling`; it knows hand-over, pouring, tool-use"
+    );
+    let nowhere = SynthesisOptions {
+        support_plane: Some(1.0),
+        ..options
+    };
+    let none = plan(&hand, &glass, "pouring", &model, 5, &nowhere, unwatched()).unwrap();
+    assert!(none.grasps.is_empty() && none.reason.is_some());
 }
