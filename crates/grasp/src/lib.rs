@@ -62,5 +62,5 @@ pub use grasp::{Features, Grasp, LinkContact};
 pub use hypothesis::{Face, Hypothesis, OPENING_MARGIN, PALM_CLEARANCE, hypotheses};
 pub use object::{GraspObject, Region};
 pub use reason::Reason;
-pub use synthesize::{Synthesis, SynthesisOptions, retry, synthesize};
+pub use synthesize::{ROUND, Synthesis, SynthesisOptions, retry, synthesize};
 pub use tries::{MOST_PRESHAPES, OFFSET_SHARE, PRESHAPES, Tries, Try};

@@ -18,11 +18,17 @@ use crate::{
     palm_orientation, unified_position,
 };
 
+/// Tries between two looks at whether there are enough grasps.
+pub const ROUND: usize = 200;
+
 /// How many grasps to look for, and where.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SynthesisOptions {
     /// How many tries to make. The paper's own is five pre-shapes for every hypothesis.
     pub tries: usize,
+    /// Stop early once this many grasps hold: easy objects need fewer tries than hard ones. Asked after every
+    /// [`ROUND`] tries, so that the answer does not depend on threads.
+    pub enough: Option<usize>,
     /// Seed of everything random.
     pub seed: u64,
     /// Names hand and object, so that each pair draws its own numbers.
@@ -35,6 +41,7 @@ impl Default for SynthesisOptions {
     fn default() -> Self {
         Self {
             tries: 1200,
+            enough: None,
             seed: 0,
             stream: String::new(),
             support_plane: None,
@@ -77,38 +84,43 @@ pub fn synthesize(
         options.tries
     };
     let (stop, finished) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let outcomes: Vec<Option<Result<Grasp, Reason>>> = (0..n_tries)
-        .into_par_iter()
-        .map_init(EpsilonSolver::default, |solver, try_idx| {
-            if stop.load(Ordering::Relaxed) {
-                return None;
-            }
-            let attempt = tries.get(try_idx, object)?;
-            let outcome = run_try(&model, object, &attempt, options.support_plane, solver);
-            let n_finished = finished.fetch_add(1, Ordering::Relaxed) + 1;
-            if !progress(n_finished) {
-                stop.store(true, Ordering::Relaxed);
-            }
-            Some(outcome)
-        })
-        .collect();
-    if stop.into_inner() {
-        return Err(GraspError::Stopped {
-            tried: finished.into_inner(),
-        });
-    }
     let mut grasps = Vec::new();
     let mut rejected = BTreeMap::new();
-    for outcome in outcomes.into_iter().flatten() {
-        match outcome {
-            Ok(grasp) => grasps.push(grasp),
-            Err(reason) => *rejected.entry(reason).or_insert(0) += 1,
+    let mut tried = 0;
+    while tried < n_tries && options.enough.is_none_or(|enough| grasps.len() < enough) {
+        let round = tried..n_tries.min(tried + options.enough.map_or(n_tries, |_| ROUND));
+        tried = round.end;
+        let outcomes: Vec<Option<Result<Grasp, Reason>>> = round
+            .into_par_iter()
+            .map_init(EpsilonSolver::default, |solver, try_idx| {
+                if stop.load(Ordering::Relaxed) {
+                    return None;
+                }
+                let attempt = tries.get(try_idx, object)?;
+                let outcome = run_try(&model, object, &attempt, options.support_plane, solver);
+                let n_finished = finished.fetch_add(1, Ordering::Relaxed) + 1;
+                if !progress(n_finished) {
+                    stop.store(true, Ordering::Relaxed);
+                }
+                Some(outcome)
+            })
+            .collect();
+        if stop.load(Ordering::Relaxed) {
+            return Err(GraspError::Stopped {
+                tried: finished.into_inner(),
+            });
+        }
+        for outcome in outcomes.into_iter().flatten() {
+            match outcome {
+                Ok(grasp) => grasps.push(grasp),
+                Err(reason) => *rejected.entry(reason).or_insert(0) += 1,
+            }
         }
     }
     Ok(Synthesis {
         grasps,
         rejected,
-        tried: n_tries,
+        tried,
         n_hypotheses: tries.n_hypotheses(),
     })
 }

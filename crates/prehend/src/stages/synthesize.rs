@@ -136,6 +136,8 @@ fn one(
         });
     }
     let (mut frame, tries) = grasp(hand, shape, options, watch)?;
+    // With enough grasps the rest of the tries need not be made.
+    watch.progress.advance((options.tries - tries.tried) as u64);
     frame.metadata.insert("fingerprint".into(), fingerprint.clone());
     // The table comes last: a run that was stopped between the two files does both again.
     files::write(
