@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use prehend_geometry::{DecomposeOptions, Decomposition, OrientedBox, decompose};
+use prehend_geometry::{DecomposeOptions, Decomposition, decompose};
 use prehend_grasp::GraspObject;
 use serde::{Deserialize, Serialize};
 
@@ -22,30 +22,15 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// The object as the planner sees it: leaves of the tree, and the inner nodes with the leaves below them.
+    /// The object as the planner sees it.
     ///
     /// # Errors
     ///
     /// What the planner says of the mesh, with its file.
     pub fn grasp_object(&self) -> Result<GraspObject, Error> {
-        let d = &self.decomposition;
-        let leaves: Vec<usize> = d.leaves().collect();
-        let inner: Vec<(OrientedBox, Vec<usize>)> = (0..d.tree.len())
-            .filter(|&node| d.tree[node].children.is_some())
-            .map(|node| {
-                let below =
-                    |leaf: usize| std::iter::successors(Some(leaf), |n| d.tree[*n].parent).any(|n| n == node);
-                (
-                    d.tree[node].region,
-                    (0..leaves.len()).filter(|&i| below(leaves[i])).collect(),
-                )
-            })
-            .collect();
-        GraspObject::from_boxes(
+        GraspObject::new(
             self.object.mesh.clone(),
-            d.root,
-            leaves.iter().map(|&n| d.tree[n].region).collect(),
-            &inner,
+            &self.decomposition,
             self.object.center_of_mass,
             self.object.material,
         )
