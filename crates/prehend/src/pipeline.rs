@@ -24,7 +24,7 @@ struct Effort {
 /// A full run: what gives the paper's 600 labelled instances a task for the demonstrator and 1,200 for the imitator.
 /// Tool-use sets the numbers: it is the rarest label, and grasps on slim tools hold seldom.
 const DEMONSTRATOR: Effort = Effort {
-    enough: 200,
+    enough: 150,
     tries: 4000,
 };
 const IMITATOR: Effort = Effort {

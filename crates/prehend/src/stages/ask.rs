@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::UnitVector3;
-use prehend_model::{Evidence, Model, Observation, Table};
+use prehend_model::{BatchQuery, Evidence, Model, Table};
 use prehend_report::Icosphere;
 use rayon::prelude::*;
 
@@ -269,28 +269,14 @@ fn classify(model: &Model, copies: &Frame) -> Result<Vec<Fold>, Error> {
 
 /// P(task | the named nodes) of every row, the tasks in the order of [`TASKS`].
 pub(super) fn task_posteriors(model: &Model, table: &Table, nodes: &[&str]) -> Result<Vec<[f64; 3]>, Error> {
-    let evidence = Evidence::from_table(model, table)?;
-    let keep: Vec<_> = nodes.iter().map(|n| model.index(n)).collect::<Result<_, _>>()?;
-    let states = model.node(model.index("task")?).states().to_vec();
-    evidence
-        .par_iter()
-        .map(|row| {
-            let mut seen = Evidence::new();
-            for (idx, observation) in row.iter().filter(|(idx, _)| keep.contains(idx)) {
-                let observation: Observation = observation.clone();
-                seen = seen.with(model, &model.node(idx).name, observation)?;
-            }
-            let posterior = model
-                .posterior(&["task"], &seen)?
-                .posterior("task")
-                .unwrap_or_default();
-            let of = |task: &str| {
-                states
-                    .iter()
-                    .position(|s| s == task)
-                    .map_or(0.0, |k| posterior[k])
-            };
-            Ok(TASKS.map(of))
+    let states = model.node(model.index("task")?).states();
+    let place = TASKS.map(|task| states.iter().position(|s| s == task));
+    BatchQuery::new(model, "task", nodes)?
+        .run_table(table)?
+        .into_iter()
+        .map(|answer| {
+            let posterior = answer?.posterior;
+            Ok(place.map(|k| k.map_or(0.0, |k| posterior[k])))
         })
         .collect()
 }
