@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::cpd::{Sign, n_mixture_parameters};
-use crate::cross_validation::{HeldOut, best_held_out, cross_validate, mean};
-use crate::em::{Mixing, Rows};
+use crate::cross_validation::{HeldOut, best_held_out, choose_priors, cross_validate, mean};
+use crate::em::{CovariancePrior, Mixing, RIDGE, Rows};
 use crate::family::Family;
 use crate::network::{MixtureOrder, MixtureSpec, Weights};
 use crate::start::{FitOptions, Robust, fit_mixture};
@@ -114,7 +114,10 @@ impl CellReport {
 
 /// Fits all cells; every number of components of every cell is one piece of parallel work.
 pub(crate) fn fit_cells(tasks: &[CellTask]) -> Vec<FittedCell> {
-    let prepared: Vec<Prepared> = tasks.par_iter().map(Prepared::new).collect();
+    let prepared: Vec<Prepared> = tasks
+        .par_iter()
+        .map(|task| choose_priors(task, Prepared::new(task)))
+        .collect();
     let jobs: Vec<(usize, usize)> = prepared
         .iter()
         .enumerate()
@@ -180,7 +183,7 @@ pub(crate) struct Prepared {
     pub rows: Rows,
     pub groups: Option<Vec<usize>>,
     n_rows: usize,
-    n_effective: f64,
+    pub n_effective: f64,
     constant: bool,
     pooled: bool,
     orders: Vec<usize>,
@@ -274,6 +277,8 @@ impl Prepared {
             n_cells: if shared { family.n_configurations } else { 1 },
             floor,
             latent_sign: spec.sign == Sign::Latent,
+            ridge: vec![RIDGE; 1 + q],
+            prior: CovariancePrior::WEAK,
         };
         let orders = orders(spec, &rows, n_effective, constant);
         let n_rows = rows.n();

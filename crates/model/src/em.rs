@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! y | p ~ Σₖ πₖ N(Bₖ [1, p], Σₖ)
-//! J = Σᵢ wᵢ log p(yᵢ | pᵢ) + Σₖ [ log πₖ / K − ½ ν log|Σₖ| − ½ tr Σₖ⁻¹ (S₀ + ε Bₖ Bₖᵀ) ]
+//! J = Σᵢ wᵢ log p(yᵢ | pᵢ) + Σₖ [ log πₖ / K − ½ ν log|Σₖ| − ½ tr Σₖ⁻¹ (ν s² I + Bₖ E Bₖᵀ) ]
 //! ```
 //!
 //! J is the logarithm of a posterior density up to a constant, and both steps are exact maximizers, so J never falls.
@@ -14,12 +14,28 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::gaussian::{LOG_TAU, cholesky, log_sum_exp, solve_lower, solve_lower_transpose, symmetrize};
 
-/// Pseudo-rows ν of the covariance prior.
-const PRIOR_ROWS: f64 = 1.0;
-/// Prior standard deviation of one pseudo-row, in units of the column's standard deviation.
-const PRIOR_DEVIATION: f64 = 0.01;
-/// Ridge ε of the regressions.
-const RIDGE: f64 = 1e-6;
+/// Least ridge of the regressions: it only decides between equal fits.
+pub(crate) const RIDGE: f64 = 1e-6;
+
+/// Prior of a component's covariance: `rows` pseudo-rows (ν), each `deviation` (s) away from the mean, in units of the
+/// column's standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CovariancePrior {
+    pub rows: f64,
+    pub deviation: f64,
+}
+
+impl CovariancePrior {
+    /// Keeps a component off a single point, and no more.
+    pub const WEAK: Self = Self {
+        rows: 1.0,
+        deviation: 0.01,
+    };
+
+    fn scatter(self) -> f64 {
+        self.rows * self.deviation * self.deviation
+    }
+}
 
 /// Standardised rows of one cell: what one mixture is fitted to.
 pub(crate) struct Rows {
@@ -37,6 +53,10 @@ pub(crate) struct Rows {
     pub floor: Vec<f64>,
     /// Whether y and −y are the same.
     pub latent_sign: bool,
+    /// Diagonal of E: ridge of the intercept and of each parent.
+    pub ridge: Vec<f64>,
+    /// Prior of the covariances.
+    pub prior: CovariancePrior,
 }
 
 /// One component in standardised units.
@@ -99,6 +119,8 @@ impl Rows {
             n_cells: self.n_cells,
             floor: self.floor.clone(),
             latent_sign: self.latent_sign,
+            ridge: self.ridge.clone(),
+            prior: self.prior,
         }
     }
 }
@@ -114,12 +136,12 @@ pub(crate) fn resume(rows: &Rows, mut mixing: Mixing, max_steps: usize, toleranc
     let k = mixing.components.len();
     let enough = tolerance * rows.total_weight();
     let (mut responsibilities, mut log_likelihood) = expect(rows, &mixing);
-    let mut objectives = vec![log_likelihood + log_prior(&mixing)];
+    let mut objectives = vec![log_likelihood + log_prior(rows, &mixing)];
     let mut converged = k == 1 && !rows.latent_sign;
     while !converged && objectives.len() <= max_steps {
         let next = maximize(rows, &responsibilities, k);
         let (next_responsibilities, next_likelihood) = expect(rows, &next);
-        let objective = next_likelihood + log_prior(&next);
+        let objective = next_likelihood + log_prior(rows, &next);
         let gain = objective - objectives[objectives.len() - 1];
         objectives.push(objective);
         (mixing, responsibilities, log_likelihood) = (next, next_responsibilities, next_likelihood);
@@ -283,7 +305,7 @@ fn maximize(rows: &Rows, responsibilities: &Responsibilities, k: usize) -> Mixin
             let yy = DMatrix::from_fn(d, d, |i, j| moments[(i, j)]);
             let yx = DMatrix::from_fn(d, m - d, |i, j| product[(i, d + j)]);
             let xx = DMatrix::from_fn(m - d, m - d, |i, j| moments[(d + i, d + j)]);
-            regress(&yy, &yx, xx, share, &rows.floor)
+            regress(&yy, &yx, xx, share, rows)
         })
         .collect();
     Mixing {
@@ -293,16 +315,10 @@ fn maximize(rows: &Rows, responsibilities: &Responsibilities, k: usize) -> Mixin
 }
 
 /// One regression from its weighted moments.
-fn regress(
-    yy: &DMatrix<f64>,
-    yx: &DMatrix<f64>,
-    mut xx: DMatrix<f64>,
-    mass: f64,
-    floor: &[f64],
-) -> Regression {
+fn regress(yy: &DMatrix<f64>, yx: &DMatrix<f64>, mut xx: DMatrix<f64>, mass: f64, rows: &Rows) -> Regression {
     let d = yy.nrows();
-    for i in 0..xx.nrows() {
-        xx[(i, i)] += RIDGE;
+    for (i, ridge) in rows.ridge.iter().enumerate() {
+        xx[(i, i)] += ridge;
     }
     symmetrize(&mut xx);
     // Collinear parents leave the Gram matrix singular to rounding; more ridge decides between equal fits.
@@ -320,10 +336,10 @@ fn regress(
     let slopes = solve_lower_transpose(&lower, &half).transpose();
     let mut scatter = yy - half.transpose() * &half;
     for i in 0..d {
-        scatter[(i, i)] += PRIOR_ROWS * PRIOR_DEVIATION * PRIOR_DEVIATION;
+        scatter[(i, i)] += rows.prior.scatter();
     }
     symmetrize(&mut scatter);
-    let covariance = clip(&(scatter / (mass + PRIOR_ROWS)), floor);
+    let covariance = clip(&(scatter / (mass + rows.prior.rows)), &rows.floor);
     Regression { slopes, covariance }
 }
 
@@ -350,7 +366,8 @@ fn clip(covariance: &DMatrix<f64>, floor: &[f64]) -> DMatrix<f64> {
 }
 
 /// The priors' part of J.
-fn log_prior(mixing: &Mixing) -> f64 {
+fn log_prior(rows: &Rows, mixing: &Mixing) -> f64 {
+    let ridge = DMatrix::from_diagonal(&DVector::from_column_slice(&rows.ridge));
     let k = mixing.components.len() as f64;
     let mut sum: f64 = mixing
         .log_weights
@@ -364,12 +381,10 @@ fn log_prior(mixing: &Mixing) -> f64 {
             continue;
         };
         let log_determinant: f64 = 2.0 * (0..d).map(|i| lower[(i, i)].ln()).sum::<f64>();
-        let scatter = DMatrix::from_diagonal(&DVector::from_element(
-            d,
-            PRIOR_ROWS * PRIOR_DEVIATION * PRIOR_DEVIATION,
-        )) + RIDGE * &component.slopes * component.slopes.transpose();
+        let scatter = DMatrix::from_diagonal(&DVector::from_element(d, rows.prior.scatter()))
+            + &component.slopes * &ridge * component.slopes.transpose();
         let trace = solve_lower_transpose(&lower, &solve_lower(&lower, &scatter)).trace();
-        sum -= 0.5 * (PRIOR_ROWS * log_determinant + trace);
+        sum -= 0.5 * (rows.prior.rows * log_determinant + trace);
     }
     sum
 }
