@@ -55,6 +55,17 @@ pub fn plan(
     options: &SynthesisOptions,
     watch: Watch,
 ) -> Result<Plan, Error> {
+    let trained_on = model
+        .extra()
+        .get("provenance")
+        .and_then(|p| p.get("hand"))
+        .and_then(|h| h.as_str());
+    if let Some(other) = trained_on.filter(|name| *name != hand.name()) {
+        watch.progress.warn(&format!(
+            "the model was trained on grasps of {other}, not of {}; its probabilities may mislead",
+            hand.name()
+        ));
+    }
     let states = model.node(model.index("task")?).states().to_vec();
     let Some(task_idx) = states.iter().position(|s| s == task) else {
         return Err(Error::input(format!(

@@ -43,7 +43,7 @@ pub struct NodeTraining {
 pub(crate) fn render(networks: &[NetworkTraining], out: &mut Sheet) -> Markup {
     let tasks = out.tasks.to_vec();
     html! {
-        p { "Every continuous node is a mixture of linear Gaussians given its parents, fitted by EM on a set balanced per task; the number of components is chosen by BIC." }
+        p { "Every continuous node is a mixture of linear Gaussians given its parents, fitted by EM on a set balanced per task; the number of components is BIC's, or fewer where objects held out of training do not bear it out." }
         @if networks.is_empty() { p.muted { "No network was trained in this run." } } @else {
             div.wide { table {
                 caption { "Trained networks: rows after balancing, and the mean log-likelihood a row in nats." }
@@ -86,14 +86,14 @@ fn bic(network: &NetworkTraining, out: &mut Sheet) -> Markup {
     }
     let name = format!("bic-{}-{}", slug(&network.hand), slug(&network.network));
     let alt = format!(
-        "{}, network {}: BIC by number of components for {} nodes; the chosen order of each is where its curve meets 0.",
+        "{}, network {}: BIC by number of components for {} nodes; BIC's choice for each is where its curve meets 0.",
         network.hand,
         network.network,
         lines.len()
     );
     let figure = curves(&name, &alt, "components", "BIC − best, nats a row", &lines);
     out.figure(&figure, &html! {
-        strong { (network.hand) ", " (network.network) } ": BIC by number of components, less each node's own best and divided by the number of rows. A curve meets 0 at the order chosen."
+        strong { (network.hand) ", " (network.network) } ": BIC by number of components, less each node's own best and divided by the number of rows. A curve meets 0 at BIC's choice; the table above has the number taken."
     })
 }
 
