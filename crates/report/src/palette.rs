@@ -88,7 +88,7 @@ pub const VIRIDIS: [[u8; 3]; 10] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// A colour of [`VIRIDIS`] for `t` in [0, 1]; outside is clamped, NaN counts as 0.
+/// A colour of the scale viridis for `t` in [0, 1]; outside is clamped, NaN counts as 0.
 pub fn viridis(t: f64) -> [u8; 3] {
     let position = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) } * (VIRIDIS.len() - 1) as f64;
     let low = (position.floor() as usize).min(VIRIDIS.len() - 2);

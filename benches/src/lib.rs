@@ -1,0 +1,3 @@
+//! Benchmarks of the kernels that the pipeline spends its time in.
+//!
+//! `cargo bench -p prehend-benches` runs them; `baselines/` keeps dated results as text.
