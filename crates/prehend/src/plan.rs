@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Translation3};
 use prehend_grasp::{Grasp, SynthesisOptions, synthesize};
 use prehend_hand::Hand;
-use prehend_model::{Evidence, Model};
+use prehend_imitation::recognise;
+use prehend_model::Model;
 
 use crate::Error;
 use crate::grasp_table::grasp_id;
@@ -88,10 +89,9 @@ pub fn plan(
     let (tried, kept) = (synthesis.tried, synthesis.grasps.len());
     let mut ranked = Vec::with_capacity(kept);
     for grasp in synthesis.grasps {
-        let posterior = model
-            .posterior(&["task"], &grasp_evidence(model, &grasp)?)?
-            .posterior("task")
-            .unwrap_or_default();
+        let posterior = recognise(model, &grasp.features)
+            .map_err(Error::input)?
+            .probabilities;
         ranked.push(Planned {
             grasp_id: grasp_id(hand.name(), &shape.object.name, grasp.try_idx),
             p_task: posterior[task_idx],
@@ -118,31 +118,6 @@ pub fn plan(
         tried,
         kept,
     })
-}
-
-/// A grasp's features as evidence, as far as the model has nodes for them.
-///
-/// # Errors
-///
-/// Where a node of the model has another dimension than the feature.
-pub fn grasp_evidence(model: &Model, grasp: &Grasp) -> Result<Evidence, Error> {
-    let f = &grasp.features;
-    let values: [(&str, &[f64]); 7] = [
-        ("size", &f.size),
-        ("cvex", &[f.cvex]),
-        ("egpc", &f.egpc),
-        ("upos", &f.upos),
-        ("dir", &f.dir),
-        ("fvol", &[f.fvol]),
-        ("qeps", &[f.qeps]),
-    ];
-    let mut evidence = Evidence::new();
-    for (node, value) in values {
-        if model.index(node).is_ok() {
-            evidence = evidence.with_value(model, node, value)?;
-        }
-    }
-    Ok(evidence)
 }
 
 fn pregrasp(hand: &Hand, grasp: &Grasp) -> Isometry3<f64> {

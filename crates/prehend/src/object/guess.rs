@@ -137,7 +137,9 @@ fn front(mesh: &TriMesh, up: &Vector3<f64>, notes: &mut Vec<String>) -> Vector3<
 }
 
 fn axis_words(v: &Vector3<f64>) -> String {
-    format!("({:.2}, {:.2}, {:.2}) in the file's axes", v.x, v.y, v.z)
+    // Adding 0 turns −0 into 0.
+    let [x, y, z] = [v.x, v.y, v.z].map(|c| (c * 100.0).round() / 100.0 + 0.0);
+    format!("({x:.2}, {y:.2}, {z:.2}) in the file's axes")
 }
 
 /// The opening of a vessel, from the rim at its top.
