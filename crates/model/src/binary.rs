@@ -13,12 +13,12 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign};
+use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::ModelError;
 use crate::model::{Model, Node};
 
 const MAGIC: &[u8; 8] = b"PREHENDM";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 52;
 /// Most bytes that decoding may ask for: a damaged length must not exhaust memory.
 const LIMIT: usize = 1 << 30;
@@ -48,6 +48,7 @@ enum StoredCpd {
         columns: Vec<String>,
         discrete_parents: Vec<usize>,
         continuous_parents: Vec<usize>,
+        weights: Weights,
         latent_sign: bool,
         sphere: bool,
         scaling: Option<Scaling>,
@@ -121,7 +122,10 @@ impl Model {
         };
         let version = word(8, 12);
         if version != u64::from(VERSION) {
-            return Err(bad(format!("version {version}"), "version 1"));
+            return Err(bad(
+                format!("version {version}"),
+                "version 2; convert the .json that was written beside it, or train again",
+            ));
         }
         let body = &bytes[HEADER..];
         if word(12, 20) != body.len() as u64 {
@@ -142,7 +146,7 @@ impl Model {
             bincode::serde::decode_from_slice(body, config).map_err(|e| {
                 bad(
                     format!("a body that does not decode ({e})"),
-                    "the fields of version 1",
+                    "the fields of version 2",
                 )
             })?;
         if read != body.len() {
@@ -192,6 +196,7 @@ fn store(cpd: &Cpd) -> StoredCpd {
             columns: cpd.columns.clone(),
             discrete_parents: positions(&cpd.discrete_parents),
             continuous_parents: positions(&cpd.continuous_parents),
+            weights: cpd.weights,
             latent_sign: cpd.sign == Sign::Latent,
             sphere: cpd.sphere,
             scaling: cpd.scaling.clone(),
@@ -230,6 +235,7 @@ fn load(name: &str, cpd: StoredCpd) -> Result<Cpd, ModelError> {
             columns,
             discrete_parents,
             continuous_parents,
+            weights,
             latent_sign,
             sphere,
             scaling,
@@ -246,6 +252,7 @@ fn load(name: &str, cpd: StoredCpd) -> Result<Cpd, ModelError> {
                         .collect::<Result<Vec<_>, _>>()
                 })
                 .collect::<Result<Vec<_>, _>>()?,
+            weights,
             sign: if latent_sign { Sign::Latent } else { Sign::Fixed },
             sphere,
             scaling,

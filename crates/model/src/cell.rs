@@ -14,11 +14,12 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::cpd::Weights;
 use crate::cpd::{Sign, n_mixture_parameters};
 use crate::cross_validation::{HeldOut, best_held_out, choose_priors, cross_validate, mean};
 use crate::em::{CovariancePrior, Mixing, RIDGE, Rows};
 use crate::family::Family;
-use crate::network::{MixtureOrder, MixtureSpec, Weights};
+use crate::network::{MixtureOrder, MixtureSpec};
 use crate::start::{FitOptions, Robust, fit_mixture};
 use crate::train::TrainOptions;
 

@@ -6,6 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::gaussian::{cholesky, log_normal_in_place, log_sum_exp, semidefinite_root};
 
+/// Weights that the configurations share agree within this: rounding of a sum of responsibilities.
+const WEIGHT_TOLERANCE: f64 = 1e-9;
+
 /// Position of a node in its model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct NodeIdx(pub usize);
@@ -58,6 +61,19 @@ pub enum Sign {
     Latent,
 }
 
+/// Where the latent component variable of a continuous node hangs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weights {
+    /// Each configuration of the discrete parents has its own weights and components.
+    #[default]
+    PerConfiguration,
+    /// The component depends on the discrete parents, the components are the same for all.
+    Shared,
+    /// The component is independent of the discrete parents, each configuration has its own Gaussians.
+    Root,
+}
+
 /// Location and spread of a node's training data, by which it was standardised.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scaling {
@@ -78,6 +94,9 @@ pub struct MixtureCpd {
     pub continuous_parents: Vec<NodeIdx>,
     /// One row per configuration; the weights of a row sum to 1.
     pub components: Vec<Vec<Component>>,
+    /// What the configurations share: under `Shared` their Gaussians are equal, under `Root` their weights. Answers do
+    /// not depend on it; the number of parameters does.
+    pub weights: Weights,
     /// Whether q and −q are the same value.
     pub sign: Sign,
     /// Whether the values are unit vectors, so that answers also carry the density on the sphere.
@@ -146,15 +165,56 @@ impl MixtureCpd {
             .collect()
     }
 
-    /// Free parameters: K [d (q + 1) + d (d + 1) / 2] + K − 1 for each configuration.
+    /// Free parameters: K [d (q + 1) + d (d + 1) / 2] for the Gaussians and K − 1 for the weights of each configuration;
+    /// what the configurations share is counted once.
     pub fn n_parameters(&self) -> usize {
-        self.components
-            .iter()
-            .map(|row| {
-                let q = row.first().map_or(0, |c| c.coefficients.ncols());
-                n_mixture_parameters(row.len(), self.dim(), q)
-            })
-            .sum()
+        let gaussians = |row: &Vec<Component>| {
+            let q = row.first().map_or(0, |c| c.coefficients.ncols());
+            n_mixture_parameters(row.len(), self.dim(), q) - row.len().saturating_sub(1)
+        };
+        let free = |row: &Vec<Component>| row.len().saturating_sub(1);
+        let (all, first) = (
+            &self.components[..],
+            &self.components[..self.components.len().min(1)],
+        );
+        let (own_gaussians, own_weights) = match self.weights {
+            Weights::PerConfiguration => (all, all),
+            Weights::Shared => (first, all),
+            Weights::Root => (all, first),
+        };
+        own_gaussians.iter().map(gaussians).sum::<usize>() + own_weights.iter().map(free).sum::<usize>()
+    }
+
+    /// The first place where the configurations do not share what `weights` says: configuration, component, problem.
+    pub(crate) fn unshared(&self) -> Option<(usize, usize, String)> {
+        let (first, others) = self.components.split_first()?;
+        let differs = |a: &Component, b: &Component| match self.weights {
+            Weights::PerConfiguration => None,
+            Weights::Shared => ((&a.mean, &a.coefficients, &a.covariance)
+                != (&b.mean, &b.coefficients, &b.covariance))
+                .then(|| "differs from configuration 0, though `weights` is \"shared\"".into()),
+            Weights::Root => ((a.weight - b.weight).abs() > WEIGHT_TOLERANCE).then(|| {
+                format!(
+                    "has the weight {}, in configuration 0 it is {}, though `weights` is \"root\"",
+                    b.weight, a.weight
+                )
+            }),
+        };
+        for (i, row) in others.iter().enumerate() {
+            if self.weights != Weights::PerConfiguration && row.len() != first.len() {
+                let problem = format!(
+                    "the row has {} components, row 0 has {}; `weights` asks for as many",
+                    row.len(),
+                    first.len()
+                );
+                return Some((i + 1, 0, problem));
+            }
+            let mut pairs = first.iter().zip(row).enumerate();
+            if let Some((k, problem)) = pairs.find_map(|(k, (a, b))| Some((k, differs(a, b)?))) {
+                return Some((i + 1, k, problem));
+            }
+        }
+        None
     }
 }
 
@@ -210,6 +270,7 @@ mod tests {
                 coefficients: DMatrix::zeros(2, 0),
                 covariance: DMatrix::identity(2, 2) * 0.01,
             }]],
+            weights: Weights::PerConfiguration,
             sign: Sign::Latent,
             sphere: true,
             scaling: None,

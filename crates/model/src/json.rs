@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign};
+use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::{ModelError, list};
 use crate::model::{Model, Node};
 
@@ -31,6 +31,8 @@ struct RawMixture {
     #[serde(default)]
     continuous_parents: Vec<String>,
     components: Vec<Vec<RawComponent>>,
+    #[serde(default)]
+    weights: Weights,
     #[serde(default)]
     sign: Sign,
     #[serde(default)]
@@ -183,6 +185,7 @@ fn read_node(name: String, mut node: Map<String, Value>, names: &[String]) -> Re
                 continuous_parents: find(&raw.continuous_parents)?,
                 columns,
                 components,
+                weights: raw.weights,
                 sign: raw.sign,
                 sphere: raw.sphere,
                 scaling: raw.scaling,
@@ -299,6 +302,9 @@ fn write_node(model: &Model, node: &Node) -> String {
             out.value("columns", &cpd.columns);
             out.value("discrete_parents", &name_all(&cpd.discrete_parents));
             out.value("continuous_parents", &name_all(&cpd.continuous_parents));
+            if cpd.weights != Weights::PerConfiguration {
+                out.value("weights", &cpd.weights);
+            }
             if cpd.sign == Sign::Latent {
                 out.text("sign", "latent");
             }

@@ -438,6 +438,14 @@ fn check_mixture(
         }
         factors.push(row_factors);
     }
+    if let Some((configuration, component, problem)) = cpd.unshared() {
+        return Err(ModelError::BadComponent {
+            node: node.name.clone(),
+            configuration,
+            component,
+            problem,
+        });
+    }
     Ok(factors)
 }
 

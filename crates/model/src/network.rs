@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Deserialize;
 
-use crate::cpd::Sign;
+use crate::cpd::{Sign, Weights};
 use crate::error::{ModelError, list};
 use crate::model::{check_columns, topological_order};
 
@@ -70,19 +70,6 @@ pub enum MixtureOrder {
         /// Whether cross-validation over groups has a say.
         guard: bool,
     },
-}
-
-/// Where the latent component variable of a continuous node hangs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Weights {
-    /// Each configuration of the discrete parents has its own weights and components.
-    #[default]
-    PerConfiguration,
-    /// The component depends on the discrete parents, the components are the same for all.
-    Shared,
-    /// The component is independent of the discrete parents, each configuration has its own Gaussians.
-    Root,
 }
 
 #[derive(Deserialize)]

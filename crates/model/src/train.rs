@@ -9,12 +9,12 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::cell::{CellReport, CellTask, FittedCell, fit_cells};
-use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign};
+use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::{ModelError, list};
 use crate::evidence::Evidence;
 use crate::family::Family;
 use crate::model::{Model, Node};
-use crate::network::{MixtureSpec, Network, NodeKind, NodeSpec, Weights};
+use crate::network::{MixtureSpec, Network, NodeKind, NodeSpec};
 use crate::table::Table;
 
 /// Settings of [`train`]. The paper gives none of them.
@@ -429,6 +429,7 @@ fn assemble(
             .map(|&parent| NodeIdx(parent))
             .collect(),
         components,
+        weights: spec.weights,
         sign: spec.sign,
         sphere: spec.sphere,
         scaling: Some(Scaling {

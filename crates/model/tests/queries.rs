@@ -291,3 +291,32 @@ fn wrong_evidence_says_what_would_do() {
     let none = Evidence::new().with(&model, "task", Observation::Likelihood(vec![0.0, 0.0]));
     assert!(none.is_err());
 }
+
+#[test]
+fn shared_weights_are_checked_and_kept() {
+    let root = EXAMPLE.replace(
+        "\"discrete_parents\": [\"task\"],",
+        "\"discrete_parents\": [\"task\"], \"weights\": \"root\",",
+    );
+    let message = Model::from_json(&root).unwrap_err().to_string();
+    assert_eq!(
+        message,
+        "`size`: configuration 1, component 0: the row has 2 components, row 0 has 1; `weights` asks for as many"
+    );
+    let one = r#"{ "weight": 1.0, "mean": [0.1, 0.2], "coefficients": [[], []], "covariance": [[1.0, 0.0], [0.0, 1.0]] }"#;
+    let two = r#"{ "weight": 0.3, "mean": [9.0, 0.2], "covariance": [[1.0, 0.0], [0.0, 1.0]] },
+        { "weight": 0.7, "mean": [0.1, 0.2], "covariance": [[1.0, 0.0], [0.0, 1.0]] }"#;
+    let tied = root.replace(one, two);
+    let model = Model::from_json(&tied).unwrap();
+    // Two rows of two 2-d Gaussians with 5 numbers each, one weight, one probability of the task.
+    assert_eq!(model.n_parameters(), 4 * 5 + 1 + 1);
+    assert_eq!(Model::from_json(&model.to_json()).unwrap(), model);
+    assert_eq!(Model::from_bytes(&model.to_bytes()).unwrap(), model);
+    let message = Model::from_json(&tied.replace("root", "shared"))
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        message,
+        "`size`: configuration 1, component 0: differs from configuration 0, though `weights` is \"shared\""
+    );
+}
