@@ -5,10 +5,12 @@
 //! expected. They also change nothing: vertices come in the file's order and number, degenerate triangles stay.
 //! [`crate::repair`] is the place for that.
 
+mod lzf;
 mod obj;
 mod off;
 mod pcd;
 mod ply;
+mod polygon;
 mod stl;
 mod text;
 mod xyz;
@@ -30,7 +32,7 @@ pub enum MeshFormat {
     Ply,
     /// A cloud as lines of `x y z`.
     Xyz,
-    /// Point Cloud Data, ASCII or binary.
+    /// Point Cloud Data, ASCII, binary or compressed.
     Pcd,
 }
 
@@ -56,7 +58,7 @@ impl MeshFormat {
 /// What a file held.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// Triangles; polygons come as fans around their first corner.
+    /// Triangles; convex polygons come as fans around their first corner, others cut where the cuts lie inside.
     Mesh(TriMesh),
     /// Points without triangles; at least one.
     Cloud(Vec<Point3<f64>>),
@@ -123,16 +125,6 @@ fn cloud(points: Vec<Point3<f64>>) -> Result<Vec<Point3<f64>>, GeometryError> {
     } else {
         Ok(points)
     }
-}
-
-/// A polygon as a fan around its first corner; fewer than three corners give nothing.
-fn push_fan(triangles: &mut Vec<[u32; 3]>, polygon: &[u32]) {
-    triangles.extend(
-        polygon
-            .windows(2)
-            .skip(1)
-            .map(|edge| [polygon[0], edge[0], edge[1]]),
-    );
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 
 use nalgebra::Point3;
 
-use super::push_fan;
+use super::polygon::Faces;
 use super::text::{Place, decode, lines};
 use crate::{GeometryError, TriMesh};
 
@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
 #[derive(Default)]
 struct Content {
     vertices: Vec<Point3<f64>>,
-    triangles: Vec<[u32; 3]>,
+    faces: Faces,
     polygon: Vec<u32>,
     /// The largest index and its line: a face may name vertices that come later, so this is judged at the end.
     largest: Option<(u32, usize)>,
@@ -68,7 +68,7 @@ impl Content {
                 if self.polygon.is_empty() {
                     return Err(place.error(record.trim(), "a face's vertices, for example `f 1 2 3`"));
                 }
-                push_fan(&mut self.triangles, &self.polygon);
+                self.faces.push(&self.polygon);
             }
             _ => {}
         }
@@ -100,7 +100,7 @@ impl Content {
                     format!("a vertex number up to {}", self.vertices.len()),
                 ))
             }
-            _ => TriMesh::new(self.vertices, self.triangles),
+            _ => self.faces.into_mesh(self.vertices),
         }
     }
 }
@@ -144,6 +144,13 @@ mod tests {
             triangles("v 0 0 1\nf 1 2 3 4 5"),
             [[0, 1, 2], [0, 2, 3], [0, 3, 4]]
         );
+    }
+
+    #[test]
+    fn a_concave_polygon_is_cut_inside() {
+        let dart = b"v 0 0 0\nv 4 0 0\nv 1 1 0\nv 0 4 0\nf 2 3 4 1\nf -3 -2 -1 -4\n";
+        let mesh = read(dart).unwrap();
+        assert!((crate::surface_area(&mesh) - 2.0 * 4.0).abs() < 1e-12);
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //! 3 0 1 2                corners, then perhaps a colour
 //! ```
 
-use super::push_fan;
+use super::polygon::Faces;
 use super::text::{Place, decode, records, truncated};
 use crate::{GeometryError, TriMesh};
 
@@ -48,7 +48,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
         vertices.push(Place { format: FORMAT, line }.point(&mut record.split_whitespace())?);
     }
 
-    let mut triangles = Vec::with_capacity(n_faces.min(bytes.len() / 8));
+    let mut faces = Faces::with_capacity(n_faces.min(bytes.len() / 8));
     let mut polygon = Vec::new();
     for face in 0..n_faces {
         let Some((line, record)) = records.next() else {
@@ -63,9 +63,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
             let word = words.next().ok_or_else(|| place.error(record, expected()))?;
             polygon.push(place.index(word, n_vertices)?);
         }
-        push_fan(&mut triangles, &polygon);
+        faces.push(&polygon);
     }
-    TriMesh::new(vertices, triangles)
+    faces.into_mesh(vertices)
 }
 
 /// What follows the keyword on its line; everything where there is none.
@@ -124,6 +124,13 @@ mod tests {
             read(text.replace("COFF", "NOFF").as_bytes()).unwrap().vertices()[1].x,
             1.0
         );
+    }
+
+    #[test]
+    fn a_concave_polygon_is_cut_inside() {
+        let text = "OFF 5 1 0\n0 0 0\n4 0 0\n4 4 0\n2 1 0\n0 4 0\n5 0 1 2 3 4\n";
+        let mesh = read(text.as_bytes()).unwrap();
+        assert!((crate::surface_area(&mesh) - 10.0).abs() < 1e-12);
     }
 
     #[test]

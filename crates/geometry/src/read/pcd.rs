@@ -2,32 +2,37 @@
 //!
 //! ```text
 //! FIELDS x y z rgb       SIZE 4 4 4 4       TYPE F F F U       COUNT 1 1 1 1
-//! WIDTH 640   HEIGHT 480   POINTS 307200   DATA ascii | binary
+//! WIDTH 640   HEIGHT 480   POINTS 307200   DATA ascii | binary | binary_compressed
 //! ```
+//!
+//! Compressed bytes hold field after field in place of row after row, packed by LZF (`lzf.rs`).
 //!
 //! The format marks missing points with NaN in all three coordinates; those are left out. Any other coordinate that is
 //! not finite is an error. The viewpoint is passed over.
 
 use nalgebra::Point3;
 
-use super::cloud;
 use super::text::{Place, decode, error, lines, quoted, truncated};
+use super::{cloud, lzf};
 use crate::GeometryError;
 
 const FORMAT: &str = "PCD";
+const DATA: &str = "DATA ascii, binary or binary_compressed";
 
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Point3<f64>>, GeometryError> {
     let head = Head::read(bytes)?;
     match head.data {
         Data::Ascii => read_ascii(&head, bytes),
-        Data::Binary => read_binary(&head, bytes),
+        Data::Binary => read_binary(&head, &bytes[head.body..]),
+        Data::Compressed => read_binary(&head, &unpacked(&head, &bytes[head.body..])?),
     }
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Data {
     Ascii,
     Binary,
+    Compressed,
 }
 
 /// One of x, y, z: where it stands in a row, and how it is written.
@@ -36,6 +41,8 @@ struct Coordinate {
     column: usize,
     offset: usize,
     size: usize,
+    /// Bytes of the whole field, of which the coordinate is the first number.
+    width: usize,
     kind: char,
 }
 
@@ -76,7 +83,8 @@ impl Head {
                     let data = match words.next().map(str::to_ascii_lowercase).as_deref() {
                         Some("ascii") => Data::Ascii,
                         Some("binary") => Data::Binary,
-                        _ => return Err(place.error(record, "DATA ascii or DATA binary")),
+                        Some("binary_compressed") => Data::Compressed,
+                        _ => return Err(place.error(record, DATA)),
                     };
                     let n_points = points
                         .or_else(|| width?.checked_mul(height))
@@ -96,11 +104,7 @@ impl Head {
                 Some(_) => return Err(place.error(record, "a line of a PCD head, such as FIELDS x y z")),
             }
         }
-        Err(truncated(
-            FORMAT,
-            "no line DATA".into(),
-            "DATA ascii or DATA binary",
-        ))
+        Err(truncated(FORMAT, "no line DATA".into(), DATA))
     }
 }
 
@@ -118,18 +122,18 @@ fn layout(
         let size = sizes.get(field).copied().unwrap_or(4);
         let kind = kinds.get(field).copied().unwrap_or('F').to_ascii_uppercase();
         let count = counts.get(field).copied().unwrap_or(1);
+        let total = size.checked_mul(count);
         if let Some(axis) = ["x", "y", "z"].iter().position(|axis| name == axis) {
             coordinates[axis] = Some(Coordinate {
                 column,
                 offset,
                 size,
+                width: total.unwrap_or(0),
                 kind,
             });
         }
-        let total = size
-            .checked_mul(count)
-            .and_then(|total| offset.checked_add(total));
-        (offset, column) = total.zip(column.checked_add(count)).ok_or_else(|| {
+        let end = total.and_then(|total| offset.checked_add(total));
+        (offset, column) = end.zip(column.checked_add(count)).ok_or_else(|| {
             place.error(
                 &format!("{name}: {count} × {size} bytes"),
                 "a field of sensible size",
@@ -177,8 +181,41 @@ fn read_ascii(head: &Head, bytes: &[u8]) -> Result<Vec<Point3<f64>>, GeometryErr
     cloud(points)
 }
 
-fn read_binary(head: &Head, bytes: &[u8]) -> Result<Vec<Point3<f64>>, GeometryError> {
-    let body = &bytes[head.body..];
+/// The body of a compressed file: its packed and its true length (u32 each), then that many packed bytes.
+fn unpacked(head: &Head, body: &[u8]) -> Result<Vec<u8>, GeometryError> {
+    let lengths = body.get(..8).map(|raw| {
+        let length =
+            |at: usize| u32::from_le_bytes([raw[at], raw[at + 1], raw[at + 2], raw[at + 3]]) as usize;
+        (length(0), length(4))
+    });
+    let Some((packed, length)) = lengths else {
+        return Err(truncated(
+            FORMAT,
+            format!("{} bytes", body.len()),
+            "two lengths, then packed bytes",
+        ));
+    };
+    let Some(bytes) = body[8..].get(..packed) else {
+        let found = format!("{} packed bytes", body.len() - 8);
+        return Err(truncated(
+            FORMAT,
+            found,
+            format!("{packed}, as declared at byte {}", head.body),
+        ));
+    };
+    lzf::unpack(bytes, length).ok_or_else(|| {
+        let place = format!("byte {}", head.body + 8);
+        error(
+            FORMAT,
+            place,
+            "bytes that do not unpack".into(),
+            format!("LZF of {length} bytes"),
+        )
+    })
+}
+
+/// Points from the bytes of the body, unpacked where they were packed.
+fn read_binary(head: &Head, body: &[u8]) -> Result<Vec<Point3<f64>>, GeometryError> {
     let available = body.len().checked_div(head.row_size).unwrap_or(0);
     if available < head.n_points {
         return Err(truncated(
@@ -188,10 +225,14 @@ fn read_binary(head: &Head, bytes: &[u8]) -> Result<Vec<Point3<f64>>, GeometryEr
         ));
     }
     let mut points = Vec::with_capacity(head.n_points);
-    for (index, row) in body.chunks_exact(head.row_size).take(head.n_points).enumerate() {
+    for index in 0..head.n_points {
         let mut point = Point3::origin();
         for (axis, coordinate) in head.coordinates.iter().enumerate() {
-            let raw = &row[coordinate.offset..coordinate.offset + coordinate.size];
+            let start = match head.data {
+                Data::Compressed => head.n_points * coordinate.offset + index * coordinate.width,
+                _ => index * head.row_size + coordinate.offset,
+            };
+            let raw = &body[start..start + coordinate.size];
             point[axis] = decode_number(coordinate.kind, raw).ok_or_else(|| {
                 let found = format!("type {} of {} bytes", coordinate.kind, coordinate.size);
                 error(
@@ -202,8 +243,9 @@ fn read_binary(head: &Head, bytes: &[u8]) -> Result<Vec<Point3<f64>>, GeometryEr
                 )
             })?;
         }
-        keep(&mut points, point, || {
-            format!("point {index} (byte {})", head.body + index * head.row_size)
+        keep(&mut points, point, || match head.data {
+            Data::Compressed => format!("point {index}"),
+            _ => format!("point {index} (byte {})", head.body + index * head.row_size),
         })?;
     }
     cloud(points)
@@ -276,6 +318,58 @@ mod tests {
         assert_eq!(read(&binary()).unwrap(), expected);
     }
 
+    /// The same two points, field after field, as LZF without a repetition: runs of at most 32 bytes.
+    fn compressed() -> Vec<u8> {
+        let (plain, head) = (binary(), format!("{HEAD}DATA binary\n").len());
+        let (rows, _) = plain[head..].as_chunks::<22>();
+        let columns: Vec<u8> = [0..8, 8..12, 12..20, 20..22]
+            .into_iter()
+            .flat_map(|field| rows.iter().flat_map(move |row| row[field.clone()].to_vec()))
+            .collect();
+        let packed: Vec<u8> = columns
+            .chunks(32)
+            .flat_map(|run| [&[run.len() as u8 - 1], run].concat())
+            .collect();
+        let lengths = [packed.len() as u32, columns.len() as u32]
+            .map(u32::to_le_bytes)
+            .concat();
+        [
+            format!("{HEAD}DATA binary_compressed\n").as_bytes(),
+            &lengths,
+            &packed,
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn packed_bytes_hold_the_same_points() {
+        assert_eq!(read(&compressed()).unwrap(), read(&binary()).unwrap());
+        let bytes = compressed();
+        let start = format!("{HEAD}DATA binary_compressed\n").len();
+        assert_eq!(
+            message(&bytes[..bytes.len() - 1]),
+            format!("PCD, end of file: found 45 packed bytes, expected 46, as declared at byte {start}")
+        );
+        assert_eq!(
+            message(&bytes[..start + 4]),
+            "PCD, end of file: found 4 bytes, expected two lengths, then packed bytes"
+        );
+        let mut wrong = bytes.clone();
+        wrong[start + 4] = 45;
+        assert_eq!(
+            message(&wrong),
+            format!(
+                "PCD, byte {}: found bytes that do not unpack, expected LZF of 45 bytes",
+                start + 8
+            )
+        );
+        let many = String::from_utf8_lossy(&bytes[..start]).replace("POINTS 2", "POINTS 3");
+        assert_eq!(
+            message(&[many.as_bytes(), &bytes[start..]].concat()),
+            "PCD, end of file: found 2 whole points, expected 3, as declared"
+        );
+    }
+
     #[test]
     fn missing_points_are_left_out() {
         let ascii = format!("{HEAD}DATA ascii\n7 7 nan nan nan\n7 7 1 2 3\n");
@@ -300,12 +394,12 @@ mod tests {
             "PCD, head: found the fields `rgb x y w`, expected x, y and z"
         );
         assert_eq!(
-            message(format!("{HEAD}DATA binary_compressed\n").as_bytes()),
-            "PCD, line 11: found `DATA binary_compressed`, expected DATA ascii or DATA binary"
+            message(format!("{HEAD}DATA zipped\n").as_bytes()),
+            "PCD, line 11: found `DATA zipped`, expected DATA ascii, binary or binary_compressed"
         );
         assert_eq!(
             message(b"FIELDS x y z\n"),
-            "PCD, end of file: found no line DATA, expected DATA ascii or DATA binary"
+            "PCD, end of file: found no line DATA, expected DATA ascii, binary or binary_compressed"
         );
     }
 

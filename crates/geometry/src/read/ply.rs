@@ -3,15 +3,17 @@
 //! The crate `ply-rs-bw` reads the head and binary elements. Text bodies are read here, word by word, since that crate
 //! refuses numbers such as `1.` and `.5`.
 
-use nalgebra::Point3;
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
-};
+mod binary_body;
+mod content;
+mod text_body;
 
-use super::text::{Place, decode, error, index_range, lines, quoted, truncated};
-use super::{Shape, cloud, push_fan};
-use crate::{GeometryError, TriMesh};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{Encoding, Header, PropertyType};
+
+use self::content::{Content, Record};
+use super::Shape;
+use super::text::{Place, decode, error, lines, quoted, truncated};
+use crate::GeometryError;
 
 const FORMAT: &str = "PLY";
 
@@ -20,9 +22,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Shape, GeometryError> {
     check_vertices(&head)?;
     let mut content = Content::default();
     match head.encoding {
-        Encoding::Ascii => read_text(&head, &bytes[body..], first_line, &mut content)?,
+        Encoding::Ascii => text_body::read(&head, &bytes[body..], first_line, &mut content)?,
         Encoding::BinaryBigEndian | Encoding::BinaryLittleEndian => {
-            read_binary(&head, bytes, body, &mut content)?;
+            binary_body::read(&head, bytes, body, &mut content)?;
         }
     }
     content.finish()
@@ -97,275 +99,12 @@ fn check_vertices(head: &Header) -> Result<(), GeometryError> {
     Ok(())
 }
 
-/// Elements in the order of the head, word by word.
-fn read_text(
-    head: &Header,
-    body: &[u8],
-    first_line: usize,
-    content: &mut Content,
-) -> Result<(), GeometryError> {
-    let text = decode(body);
-    let mut words = lines(&text).flat_map(|(line, record)| {
-        record
-            .split_whitespace()
-            .map(move |word| (first_line + line - 1, word))
-    });
-    let mut record = Record::default();
-    for (name, element) in &head.elements {
-        if element.properties.is_empty() {
-            continue;
-        }
-        for index in 0..element.count {
-            record.clear();
-            let mut line = 0;
-            let mut next = || {
-                let (at, word) = words.next().ok_or_else(|| {
-                    truncated(
-                        FORMAT,
-                        format!("{index} of element {name}"),
-                        format!("{}, as declared", element.count),
-                    )
-                })?;
-                line = at;
-                Ok((
-                    Place {
-                        format: FORMAT,
-                        line: at,
-                    },
-                    word,
-                ))
-            };
-            for (property, definition) in &element.properties {
-                let (place, word) = next()?;
-                match definition.data_type {
-                    // What is not used is not judged: a colour may be anything.
-                    PropertyType::Scalar(_) => {
-                        if let Some(slot) = record.coordinate(property) {
-                            *slot = place.number(word)?;
-                        }
-                    }
-                    PropertyType::List(..) => {
-                        let wanted = is_corners(property);
-                        for _ in 0..place.count(word, "the length of a list")? {
-                            let (place, word) = next()?;
-                            if wanted {
-                                let corner = word.parse().map_err(|_| place.error(word, "a vertex index"))?;
-                                record.corners.push(corner);
-                            }
-                        }
-                    }
-                }
-            }
-            content.add(name, &record, || format!("line {line}"))?;
-        }
-    }
-    Ok(())
-}
-
-/// Elements in the order of the head, byte by byte.
-fn read_binary(head: &Header, bytes: &[u8], body: usize, content: &mut Content) -> Result<(), GeometryError> {
-    let parser = Parser::<Record>::new();
-    let mut rest = &bytes[body..];
-    for (name, element) in &head.elements {
-        let least = least_size(element);
-        if least == 0 {
-            continue;
-        }
-        if element.count > rest.len() / least {
-            let found = format!("{} bytes for element {name}", rest.len());
-            return Err(truncated(
-                FORMAT,
-                found,
-                format!("at least {least} for each of {}", element.count),
-            ));
-        }
-        for index in 0..element.count {
-            let offset = bytes.len() - rest.len();
-            let place = || format!("{name} {index} (byte {offset})");
-            let record = match head.encoding {
-                Encoding::BinaryBigEndian => parser.read_big_endian_element(&mut rest, element),
-                _ => parser.read_little_endian_element(&mut rest, element),
-            }
-            .map_err(|cause| binary_error(place(), &cause))?;
-            content.add(name, &record, place)?;
-        }
-    }
-    Ok(())
-}
-
-fn binary_error(place: String, cause: &ParseError) -> GeometryError {
-    let (found, expected) = match cause.kind() {
-        std::io::ErrorKind::UnexpectedEof => ("the end of the file", "the rest of the element"),
-        std::io::ErrorKind::InvalidData => {
-            ("vertex indices that are not whole numbers", "a list of integers")
-        }
-        _ => ("a list of negative or impossible length", "a length of 0 or more"),
-    };
-    error(FORMAT, place, found.into(), expected)
-}
-
-/// The fewest bytes that one element can have: lists may be empty.
-fn least_size(element: &ElementDef) -> usize {
-    let size = |scalar: &ScalarType| match scalar {
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
-    };
-    element
-        .properties
-        .values()
-        .map(|property| match &property.data_type {
-            PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => size(scalar),
-        })
-        .sum()
-}
-
-fn is_corners(property: &str) -> bool {
-    matches!(property, "vertex_indices" | "vertex_index")
-}
-
-/// One element: a vertex's coordinates or a face's corners.
-#[derive(Debug, Default)]
-struct Record {
-    point: [f64; 3],
-    corners: Vec<i64>,
-}
-
-impl Record {
-    fn clear(&mut self) {
-        self.corners.clear();
-    }
-
-    fn coordinate(&mut self, property: &str) -> Option<&mut f64> {
-        let axis = ["x", "y", "z"].iter().position(|axis| *axis == property)?;
-        Some(&mut self.point[axis])
-    }
-}
-
-impl PropertyAccess for Record {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let value = match property {
-            Property::Char(v) => f64::from(v),
-            Property::UChar(v) => f64::from(v),
-            Property::Short(v) => f64::from(v),
-            Property::UShort(v) => f64::from(v),
-            Property::Int(v) => f64::from(v),
-            Property::UInt(v) => f64::from(v),
-            Property::Float(v) => f64::from(v),
-            Property::Double(v) => v,
-            list if is_corners(name) => {
-                self.corners = match list {
-                    Property::ListChar(v) => v.into_iter().map(i64::from).collect(),
-                    Property::ListUChar(v) => v.into_iter().map(i64::from).collect(),
-                    Property::ListShort(v) => v.into_iter().map(i64::from).collect(),
-                    Property::ListUShort(v) => v.into_iter().map(i64::from).collect(),
-                    Property::ListInt(v) => v.into_iter().map(i64::from).collect(),
-                    Property::ListUInt(v) => v.into_iter().map(i64::from).collect(),
-                    _ => return PropertyAccessResult::UnsupportedType,
-                };
-                return PropertyAccessResult::Set;
-            }
-            _ => return PropertyAccessResult::Ignored,
-        };
-        match self.coordinate(name) {
-            Some(slot) => {
-                *slot = value;
-                PropertyAccessResult::Set
-            }
-            None => PropertyAccessResult::Ignored,
-        }
-    }
-}
-
-#[derive(Default)]
-struct Content {
-    vertices: Vec<Point3<f64>>,
-    triangles: Vec<[u32; 3]>,
-    polygon: Vec<u32>,
-    has_faces: bool,
-    /// The largest index and where it stands: faces may come before vertices, so this is judged at the end.
-    largest: Option<(u32, String)>,
-}
-
-impl Content {
-    fn add(
-        &mut self,
-        element: &str,
-        record: &Record,
-        place: impl Fn() -> String,
-    ) -> Result<(), GeometryError> {
-        match element {
-            "vertex" => {
-                if let Some(value) = record.point.iter().find(|c| !c.is_finite()) {
-                    return Err(error(
-                        FORMAT,
-                        place(),
-                        format!("the coordinate {value}"),
-                        "a finite number",
-                    ));
-                }
-                self.vertices.push(record.point.into());
-            }
-            "face" => {
-                self.has_faces = true;
-                self.polygon.clear();
-                for &corner in &record.corners {
-                    let corner = self.index(corner, &place)?;
-                    self.polygon.push(corner);
-                }
-                push_fan(&mut self.triangles, &self.polygon);
-            }
-            "tristrips" => {
-                self.has_faces = true;
-                // −1 starts a new strip; every second triangle of a strip is wound the other way.
-                for strip in record.corners.split(|&corner| corner == -1) {
-                    let strip: Vec<u32> = strip
-                        .iter()
-                        .map(|&c| self.index(c, &place))
-                        .collect::<Result<_, _>>()?;
-                    self.triangles
-                        .extend(strip.windows(3).enumerate().map(|(nth, t)| match nth % 2 {
-                            0 => [t[0], t[1], t[2]],
-                            _ => [t[1], t[0], t[2]],
-                        }));
-                }
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn index(&mut self, corner: i64, place: impl Fn() -> String) -> Result<u32, GeometryError> {
-        let index = u32::try_from(corner)
-            .map_err(|_| error(FORMAT, place(), corner.to_string(), "a vertex index from 0"))?;
-        if self.largest.as_ref().is_none_or(|(largest, _)| index > *largest) {
-            self.largest = Some((index, place()));
-        }
-        Ok(index)
-    }
-
-    fn finish(self) -> Result<Shape, GeometryError> {
-        match self.largest {
-            Some((index, place)) if index as usize >= self.vertices.len() => Err(error(
-                FORMAT,
-                place,
-                index.to_string(),
-                index_range(self.vertices.len()),
-            )),
-            _ if self.has_faces => TriMesh::new(self.vertices, self.triangles).map(Shape::Mesh),
-            _ => cloud(self.vertices).map(Shape::Cloud),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::Point3;
+
     use super::*;
+    use crate::TriMesh;
 
     const HEAD: &str = "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\nproperty double y\nproperty float z\nproperty uchar red\nelement face 1\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n";
     const BODY: &str = "0. 0 0 255\n1 0 0 255\n1 1 0 255\n.0 1 .5 255\n7 4 0 1 2 3\n";
@@ -455,6 +194,19 @@ mod tests {
             read(cloud.as_bytes()).unwrap(),
             Shape::Cloud(vec![Point3::new(1.0, 2.0, 3.0), Point3::new(4.0, 5.0, 6.0)])
         );
+    }
+
+    #[test]
+    fn further_properties_lists_and_elements_do_not_matter_nor_does_the_order_of_elements() {
+        let text = "ply\nformat ascii 1.0\nobj_info made elsewhere\nelement material 1\nproperty list uint double weights\n\
+            property char kind\nelement face 2\nproperty list uchar float texcoord\n\
+            property list short uchar vertex_indices\nproperty ushort flags\nelement vertex 4\n\
+            property list uchar int near\nproperty double z\nproperty int8 x\nproperty uint16 y\nend_header\n\
+            2 0.5 nan -3\n6 0 0 1 0 0 1 3 0 1 2 9\n0 4 0 1 2 3 9\n2 1 2 0.5 0 0\n0 .5 4 0\n0 .5 1 1\n1 7 .5 0 4\n";
+        let mesh = mesh(text.as_bytes());
+        assert_eq!(mesh.vertices()[1], Point3::new(4.0, 0.0, 0.5));
+        // The second face is a dart: it is cut from its inner corner.
+        assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]

@@ -17,7 +17,7 @@
 
 use nalgebra::Point3;
 
-use super::push_fan;
+use super::polygon::Faces;
 use super::text::{Place, decode, error, lines, truncated};
 use crate::{GeometryError, TriMesh};
 
@@ -101,7 +101,7 @@ fn read_ascii(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
     const STATEMENT: &str = "facet, outer loop, vertex, endloop, endfacet or endsolid";
     let text = decode(bytes);
     let mut vertices: Vec<Point3<f64>> = Vec::new();
-    let mut triangles = Vec::new();
+    let mut faces = Faces::default();
     let mut loop_start = None;
     for (line, record) in lines(&text) {
         let place = Place { format: FORMAT, line };
@@ -127,7 +127,7 @@ fn read_ascii(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
                         return Err(place.error(&found, "three vertices"));
                     }
                     let corners: Vec<u32> = (start as u32..vertices.len() as u32).collect();
-                    push_fan(&mut triangles, &corners);
+                    faces.push(&corners);
                     loop_start = None;
                 }
                 ("endfacet", None) => {}
@@ -143,7 +143,7 @@ fn read_ascii(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
             "endloop, endfacet and endsolid",
         ));
     }
-    TriMesh::new(vertices, triangles)
+    faces.into_mesh(vertices)
 }
 
 #[cfg(test)]
