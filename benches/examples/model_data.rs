@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             write_csv(&table, &mut out)?;
         }
         ["network", mixture @ ..] => {
-            out.write_all(paper_network::network(mixture.first().copied()).as_bytes())?
+            out.write_all(paper_network::network(mixture.first().copied()).as_bytes())?;
         }
         ["model"] => out.write_all(paper_network::truth()?.to_json().as_bytes())?,
         _ => return Err("expected `rows N SEED [GAPS]`, `network [MIXTURE]` or `model`".into()),

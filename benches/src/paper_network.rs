@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use nalgebra::{DMatrix, DVector};
 use prehend::model::{
-    Column, Component, Cpd, DiscreteCpd, MixtureCpd, Model, ModelError, Node, NodeIdx, Sign, Table,
+    Column, Component, Cpd, DiscreteCpd, MixtureCpd, Model, ModelError, Node, NodeIdx, Sign, Table, Weights,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -77,6 +77,7 @@ fn model_with(components: Option<usize>) -> Result<Model, ModelError> {
             components: (0..configurations)
                 .map(|_| row(columns.len(), q, components.unwrap_or(k), &mut rng))
                 .collect(),
+            weights: Weights::PerConfiguration,
             sign: Sign::Fixed,
             sphere: false,
             scaling: None,
