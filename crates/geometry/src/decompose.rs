@@ -1,15 +1,16 @@
 //! An object as a few boxes.
 
+mod body;
+mod body_frame;
 mod cut;
+mod fit;
+mod paper;
 mod region;
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, Serializer};
 
-use crate::min_box::minimum_volume_box_near;
 use crate::{BoxRecord, GeometryError, OrientedBox, TriMesh};
-use cut::{Cut, promising_cuts};
-use region::Region;
+use paper::fit_and_split;
 
 /// When to split a box, and how finely to look.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,6 +97,19 @@ pub struct TreeNode {
 }
 
 impl Decomposition {
+    fn of_tree(tree: Vec<TreeNode>) -> Self {
+        let root = tree[0].region;
+        let leaves = tree.iter().filter(|n| n.children.is_none());
+        let boxes: Vec<OrientedBox> = leaves.map(|n| n.region).collect();
+        let total: f64 = boxes.iter().map(OrientedBox::volume).sum();
+        Self {
+            root,
+            cvex: root.volume() / total,
+            boxes,
+            tree,
+        }
+    }
+
     /// The tree's leaves as indices of `tree`, in the order of `boxes`.
     pub fn leaves(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.tree.len()).filter(|&node| self.tree[node].children.is_none())
@@ -133,11 +147,16 @@ fn with_volumes<S: Serializer>(boxes: &[OrientedBox], serializer: S) -> Result<S
 /// each is refined. Boxes are fitted at these (at most six) cuts, and the split that leaves the least volume
 /// is meant: where the smallest box lies askew, as it does about a mug, the cut with the least α alone is a
 /// matter of luck. H₁ and H₂ are computed from the triangles clipped at the cut: the limit of ever denser
-/// samples of the surface, without their noise, so there is no seed. Samples of the inside would add nothing:
-/// where a closed body is cut, the hull of each part of its surface contains the part of its inside, because
-/// the rim of the cut face belongs to both. The same holds for the boxes, which are fitted to the clipped
-/// triangles: together they cover the surface exactly and, where it is closed, the inside. The cavity of a
-/// vessel counts as object by the same token.
+/// samples of the surface, without their noise, so there is no seed.
+///
+/// Cuts are chosen in a frame that the body carries with it (principal axes of its surface), with coordinates rounded
+/// to 1e-9 of its size and boxes found quickly; whether a split counts is decided by the smallest boxes around the
+/// triangles where they lie. So cvex does not depend on how the body is turned, but for the 5e-4 by which
+/// [`minimum_volume_box`](crate::minimum_volume_box) prefers boxes along the frame.
+///
+/// Together the boxes cover the surface exactly and, where it is closed, the inside: they hold the clipped triangles,
+/// and the points inside where three cuts meet. The cavity of a vessel counts as object, since the rim of each cut
+/// belongs to both of its sides.
 /// Meshes may have holes, loose parts and either winding.
 ///
 /// # Errors
@@ -165,118 +184,5 @@ fn with_volumes<S: Serializer>(boxes: &[OrientedBox], serializer: S) -> Result<S
 /// ```
 pub fn decompose(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposition, GeometryError> {
     options.check()?;
-    let whole = Region::of_mesh(mesh);
-    let smallest = minimum_volume_box_near(whole.vertices(), &[])?;
-    let longest = smallest.extents.max();
-    if longest == 0.0 || !(longest * longest * longest).is_finite() {
-        return Err(GeometryError::BadExtents {
-            extents: smallest.extents.into(),
-        });
-    }
-    let fitting = Fitting {
-        options,
-        min_extent: options.min_extent * longest,
-        min_slab: options.min_slab * longest,
-    };
-
-    let root = smallest.floored(fitting.min_extent);
-    let mut tree = vec![TreeNode {
-        region: root,
-        parent: None,
-        children: None,
-    }];
-    let mut splits = vec![fitting.best_split(&whole, &root)?];
-    let mut total = root.volume();
-    let mut n_boxes = 1;
-    while n_boxes < options.max_boxes {
-        let mut best: Option<(usize, f64)> = None;
-        for (node, split) in splits.iter().enumerate() {
-            if let Some(split) = split {
-                let saved = tree[node].region.volume() - split.boxes[0].volume() - split.boxes[1].volume();
-                if best.is_none_or(|(_, most)| saved > most) {
-                    best = Some((node, saved));
-                }
-            }
-        }
-        let Some((node, _)) = best.filter(|(_, saved)| (total - saved) / total < options.gain) else {
-            break;
-        };
-        let Some(split) = splits[node].take() else { break };
-        tree[node].children = Some([tree.len(), tree.len() + 1]);
-        for (part, fitted) in split.parts.iter().zip(split.boxes) {
-            tree.push(TreeNode {
-                region: fitted,
-                parent: Some(node),
-                children: None,
-            });
-            splits.push(fitting.best_split(part, &fitted)?);
-        }
-        n_boxes += 1;
-        total = tree
-            .iter()
-            .filter(|n| n.children.is_none())
-            .map(|n| n.region.volume())
-            .sum();
-    }
-    let boxes = tree
-        .iter()
-        .filter(|n| n.children.is_none())
-        .map(|n| n.region)
-        .collect();
-    Ok(Decomposition {
-        root,
-        boxes,
-        cvex: root.volume() / total,
-        tree,
-    })
-}
-
-/// The lengths that the options mean for one mesh (m).
-struct Fitting<'a> {
-    options: &'a DecomposeOptions,
-    min_extent: f64,
-    min_slab: f64,
-}
-
-/// Two parts and the smallest boxes around them.
-struct Split {
-    parts: [Region; 2],
-    boxes: [OrientedBox; 2],
-}
-
-impl Fitting<'_> {
-    /// The split that leaves the least volume, of those at promising cuts; none where no cut frees anything.
-    fn best_split(&self, region: &Region, fitted: &OrientedBox) -> Result<Option<Split>, GeometryError> {
-        let mut best: Option<(Split, f64)> = None;
-        for cut in promising_cuts(region, fitted, self.options.n_cells, self.min_slab) {
-            if let Some(split) = self.split_at(region, fitted, &cut)? {
-                let volume = split.boxes[0].volume() + split.boxes[1].volume();
-                if best
-                    .as_ref()
-                    .is_none_or(|(_, least)| volume < least * (1.0 - 1e-6))
-                {
-                    best = Some((split, volume));
-                }
-            }
-        }
-        Ok(best.map(|(split, _)| split))
-    }
-
-    fn split_at(
-        &self,
-        region: &Region,
-        fitted: &OrientedBox,
-        cut: &Cut,
-    ) -> Result<Option<Split>, GeometryError> {
-        let parts = region.cut(&fitted.axis(cut.axis), &fitted.center(), cut.position);
-        if parts.iter().any(Region::is_empty) {
-            return Ok(None);
-        }
-        let axes: [Vector3<f64>; 3] = std::array::from_fn(|k| fitted.axis(k));
-        let fit = |part: &Region| {
-            Ok::<_, GeometryError>(minimum_volume_box_near(part.vertices(), &axes)?.floored(self.min_extent))
-        };
-        let boxes = [fit(&parts[0])?, fit(&parts[1])?];
-        Ok(Some(Split { parts, boxes }))
-    }
+    fit_and_split(mesh, options)
 }

@@ -2,24 +2,46 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::TriMesh;
 
-/// Some triangles of a surface, or what planes left of them. Every vertex belongs to a triangle.
+/// A plane through a point; the unit normal points above.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    pub(super) normal: Vector3<f64>,
+    pub(super) origin: Point3<f64>,
+}
+
+impl Plane {
+    fn height(&self, p: &Point3<f64>) -> f64 {
+        self.normal.dot(&(p - self.origin))
+    }
+}
+
+/// Some triangles of a surface, or what planes left of them, and the corners that the planes have inside the solid.
+///
+/// Every vertex belongs to a triangle. The corners of the part of a solid between planes are vertices of its surface,
+/// places where planes cut its edges or two of them its faces, and points inside the solid where three planes meet:
+/// with these the hull of a part contains its part of the inside.
+#[derive(Clone)]
 pub(super) struct Region {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
+    /// The planes that cut it out, each with the side that was kept (1 above, −1 below).
+    planes: Vec<(Plane, f64)>,
+    inner: Vec<Point3<f64>>,
 }
 
 /// A vertex this close to the plane, relative to the largest distance from it, lies in it: no slivers by rounding.
 const ON_PLANE: f64 = 1e-12;
 
 impl Region {
-    pub(super) fn of_mesh(mesh: &TriMesh) -> Self {
+    /// The mesh, each of its vertices as `placed` has it.
+    pub(super) fn of_mesh(mesh: &TriMesh, placed: impl Fn(&Point3<f64>) -> Point3<f64>) -> Self {
         let mut builder = Builder::new(mesh.vertices().len());
         for triangle in mesh.triangles() {
-            let corners = triangle.map(|v| builder.keep(v, &mesh.vertices()[v as usize]));
+            let corners = triangle.map(|v| builder.keep(v, &placed(&mesh.vertices()[v as usize])));
             builder.region.triangles.push(corners);
         }
         builder.region
@@ -33,23 +55,61 @@ impl Region {
         &self.triangles
     }
 
+    /// What a box must hold: the vertices and the corners inside.
+    pub(super) fn points(&self) -> Vec<Point3<f64>> {
+        self.vertices.iter().chain(&self.inner).copied().collect()
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    /// The parts below and above the plane {p : normal · (p − origin) = position}; triangles across it are clipped.
-    pub(super) fn cut(&self, normal: &Vector3<f64>, origin: &Point3<f64>, position: f64) -> [Self; 2] {
-        let mut height: Vec<f64> = self
-            .vertices
-            .iter()
-            .map(|p| normal.dot(&(p - origin)) - position)
-            .collect();
-        let snap = ON_PLANE * height.iter().fold(0.0_f64, |most, h| most.max(h.abs()));
-        for h in &mut height {
+    /// The points of either side of a plane, without the parts' triangles and new corners inside.
+    pub(super) fn points_beside(&self, plane: &Plane) -> [Vec<Point3<f64>>; 2] {
+        let height = self.heights(plane);
+        let mut sides = [Vec::new(), Vec::new()];
+        for (p, h) in self.vertices.iter().zip(&height) {
+            if *h <= 0.0 {
+                sides[0].push(*p);
+            }
+            if *h >= 0.0 {
+                sides[1].push(*p);
+            }
+        }
+        for p in &self.inner {
+            sides[usize::from(plane.height(p) > 0.0)].push(*p);
+        }
+        for &[a, b, c] in &self.triangles {
+            for [from, to] in [[a, b], [b, c], [c, a]] {
+                let (low, high) = (height[from as usize], height[to as usize]);
+                if low * high < 0.0 {
+                    let p = crossing(
+                        [&self.vertices[from as usize], &self.vertices[to as usize]],
+                        [low, high],
+                    );
+                    for side in &mut sides {
+                        side.push(p);
+                    }
+                }
+            }
+        }
+        sides
+    }
+
+    fn heights(&self, plane: &Plane) -> Vec<f64> {
+        let mut heights: Vec<f64> = self.vertices.iter().map(|p| plane.height(p)).collect();
+        let snap = ON_PLANE * heights.iter().fold(0.0_f64, |most, h| most.max(h.abs()));
+        for h in &mut heights {
             if h.abs() <= snap {
                 *h = 0.0;
             }
         }
+        heights
+    }
+
+    /// The parts below and above a plane; triangles across it are clipped. `whole` is the body that this is part of.
+    pub(super) fn cut(&self, plane: &Plane, whole: &Self) -> [Self; 2] {
+        let height = self.heights(plane);
         let n = self.vertices.len();
         let mut sides = [Builder::new(n), Builder::new(n)];
         for triangle in &self.triangles {
@@ -64,7 +124,72 @@ impl Region {
                 }
             }
         }
-        sides.map(|side| side.region)
+        let corners = self.corners_on(plane, whole);
+        let mut sides = sides.map(|side| side.region);
+        for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
+            side.planes.clone_from(&self.planes);
+            side.planes.push((*plane, sign));
+            side.inner.clone_from(&corners);
+            side.inner
+                .extend(self.inner.iter().filter(|p| sign * plane.height(p) >= 0.0));
+        }
+        sides
+    }
+
+    /// Where the plane meets two of the region's own inside the solid.
+    fn corners_on(&self, plane: &Plane, whole: &Self) -> Vec<Point3<f64>> {
+        let mut corners = Vec::new();
+        for (i, (first, _)) in self.planes.iter().enumerate() {
+            for (second, _) in &self.planes[..i] {
+                let normals = Matrix3::from_rows(&[
+                    plane.normal.transpose(),
+                    first.normal.transpose(),
+                    second.normal.transpose(),
+                ]);
+                let offsets = Vector3::new(0.0, -first.height(&plane.origin), -second.height(&plane.origin));
+                let Some(inverse) = normals
+                    .try_inverse()
+                    .filter(|_| normals.determinant().abs() > 1e-6)
+                else {
+                    continue;
+                };
+                let corner = plane.origin + inverse * offsets;
+                let is_inside = self
+                    .planes
+                    .iter()
+                    .all(|(p, side)| side * p.height(&corner) >= -1e-9 * whole.reach());
+                if is_inside && whole.winds_around(&corner) {
+                    corners.push(corner);
+                }
+            }
+        }
+        corners
+    }
+
+    fn reach(&self) -> f64 {
+        let first = self.vertices[0];
+        self.vertices
+            .iter()
+            .map(|p| (p - first).amax())
+            .fold(0.0, f64::max)
+    }
+
+    /// Whether the surface winds around a point at least half: for a closed surface, whether the point is inside.
+    ///
+    /// Sum of the solid angles of the triangles (van Oosterom and Strackee 1983), which holes and loose parts disturb
+    /// only in proportion to their size (Jacobson, Kavan, Sorkine-Hornung 2013).
+    fn winds_around(&self, p: &Point3<f64>) -> bool {
+        let angle: f64 = self
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|v| self.vertices[v as usize] - p);
+                let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
+                let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+                2.0 * a.dot(&b.cross(&c)).atan2(below)
+            })
+            .sum();
+        angle.abs() >= std::f64::consts::TAU
     }
 
     fn keep_whole(&self, triangle: [u32; 3], side: &mut Builder) {
@@ -90,8 +215,8 @@ impl Region {
                 // Both triangles of an edge cut it in the same order of its ends, so they agree to the last bit.
                 let (low, high) = (from.min(to), from.max(to));
                 let (p, q) = (self.vertices[low as usize], self.vertices[high as usize]);
-                let t = height[low as usize] / (height[low as usize] - height[high as usize]);
-                push(side.keep_on_edge([low, high], || p + (q - p) * t));
+                let heights = [height[low as usize], height[high as usize]];
+                push(side.keep_on_edge([low, high], || crossing([&p, &q], heights)));
             }
         }
         for last in 2..len {
@@ -100,6 +225,11 @@ impl Region {
                 .push([polygon[0], polygon[last - 1], polygon[last]]);
         }
     }
+}
+
+/// Where an edge meets the plane that its ends lie at these heights from.
+fn crossing([p, q]: [&Point3<f64>; 2], [low, high]: [f64; 2]) -> Point3<f64> {
+    p + (q - p) * (low / (low - high))
 }
 
 /// A region under construction, and where the vertices of its source went.
@@ -115,6 +245,8 @@ impl Builder {
             region: Region {
                 vertices: Vec::new(),
                 triangles: Vec::new(),
+                planes: Vec::new(),
+                inner: Vec::new(),
             },
             kept: vec![u32::MAX; n_source_vertices],
             on_edges: BTreeMap::new(),
@@ -157,10 +289,14 @@ mod tests {
     fn the_parts_of_a_cut_have_the_area_of_the_whole() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(Point3::from);
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]).unwrap();
-        let whole = Region::of_mesh(&mesh);
+        let whole = Region::of_mesh(&mesh, |p| *p);
         let normal = Vector3::new(1.0, 2.0, 3.0).normalize();
         for position in [0.1, 0.5, 1.0] {
-            let [below, above] = whole.cut(&normal, &Point3::origin(), position);
+            let plane = Plane {
+                normal,
+                origin: (normal * position).into(),
+            };
+            let [below, above] = whole.cut(&plane, &whole);
             assert!((area(&below) + area(&above) - area(&whole)).abs() < 1e-12);
             assert!(
                 below
@@ -180,8 +316,12 @@ mod tests {
     #[test]
     fn a_cut_beside_the_body_leaves_one_part_empty() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from);
-        let whole = Region::of_mesh(&TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap());
-        let [below, above] = whole.cut(&Vector3::x(), &Point3::origin(), 2.0);
+        let whole = Region::of_mesh(&TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap(), |p| *p);
+        let plane = Plane {
+            normal: Vector3::x(),
+            origin: Point3::new(2.0, 0.0, 0.0),
+        };
+        let [below, above] = whole.cut(&plane, &whole);
         assert!(!below.is_empty() && above.is_empty());
     }
 }

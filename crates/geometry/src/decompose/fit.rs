@@ -1,0 +1,178 @@
+//! A small box around points, found quickly: how cuts are judged before the smallest boxes are fitted.
+
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+
+use crate::OrientedBox;
+use crate::hull::hull_within;
+use crate::planar::planar_hull;
+
+/// How far inside the hull of the points the simplified hull may lie that directions are tried on; lengths are still
+/// those of all points.
+const SIMPLIFIED: f64 = 2e-3;
+/// Directions besides the given ones: normals of large facets, and spread evenly.
+const N_FACETS: usize = 12;
+const N_LATTICE: usize = 12;
+/// Boxes that are measured again about their own axes.
+const N_STARTS: usize = 2;
+const MAX_ROUNDS: usize = 5;
+/// A box along the given axes is taken where no other is smaller by this share.
+const PREFERENCE: f64 = 1e-3;
+
+/// Points with their simplified hull, ready to be boxed.
+pub(super) struct Cloud {
+    points: Vec<Point3<f64>>,
+    corners: Vec<Vector3<f64>>,
+    facets: Vec<Vector3<f64>>,
+}
+
+impl Cloud {
+    /// `points` must not be empty.
+    pub(super) fn new(points: Vec<Point3<f64>>) -> Self {
+        let hull = hull_within(&points, SIMPLIFIED);
+        let mut facets: Vec<(f64, Vector3<f64>)> = hull
+            .triangles()
+            .iter()
+            .map(|t| t.map(|v| hull.points()[v as usize]))
+            .map(|[a, b, c]| (b - a).cross(&(c - a)))
+            .filter_map(|n| Some((n.norm(), n.try_normalize(0.0)?)))
+            .collect();
+        facets.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut normals: Vec<Vector3<f64>> = Vec::new();
+        for (_, normal) in facets {
+            if normals.len() == N_FACETS {
+                break;
+            }
+            if normals.iter().all(|n| n.dot(&normal).abs() < 1.0 - 1e-4) {
+                normals.push(normal);
+            }
+        }
+        let corners = hull.points().iter().map(|p| p.coords).collect();
+        Self {
+            points,
+            corners,
+            facets: normals,
+        }
+    }
+
+    /// The smaller of the boxes with one axis along one of `axes`; no extent is below `min_extent`.
+    pub(super) fn rough_volume(&self, axes: &[Vector3<f64>], min_extent: f64) -> f64 {
+        axes.iter()
+            .map(|axis| self.best_about(axis, min_extent).1)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// A box around the points, usually less than a hundredth above the smallest; along `axes` where that costs next
+    /// to nothing.
+    pub(super) fn fit(&self, axes: &[Vector3<f64>; 3], min_extent: f64) -> OrientedBox {
+        let given = Matrix3::from_columns(axes);
+        let along_given = (given, self.volume_along(&given, min_extent));
+        let mut found: Vec<(Matrix3<f64>, f64)> = axes
+            .iter()
+            .chain(&self.facets)
+            .copied()
+            .chain(lattice())
+            .map(|d| self.best_about(&d, min_extent))
+            .collect();
+        let about_given = found[..3]
+            .iter()
+            .copied()
+            .reduce(|a, b| if b.1 < a.1 { b } else { a });
+        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut best = found[0];
+        for start in found.iter().take(N_STARTS) {
+            let settled = self.settle(*start, min_extent);
+            if settled.1 < best.1 {
+                best = settled;
+            }
+        }
+        for preferred in about_given.into_iter().chain([along_given]) {
+            if preferred.1 <= best.1 * (1.0 + PREFERENCE) {
+                best = preferred;
+            }
+        }
+        self.around(&best.0, min_extent)
+    }
+
+    fn settle(&self, start: (Matrix3<f64>, f64), min_extent: f64) -> (Matrix3<f64>, f64) {
+        let mut best = start;
+        for _ in 0..MAX_ROUNDS {
+            let (axes, before) = best;
+            for k in 0..3 {
+                let found = self.best_about(&axes.column(k).into(), min_extent);
+                if found.1 < best.1 {
+                    best = found;
+                }
+            }
+            if best.1 >= before * (1.0 - 1e-4) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The smallest box of the simplified hull with one axis along a unit vector: flush with an edge of the outline.
+    fn best_about(&self, axis: &Vector3<f64>, min_extent: f64) -> (Matrix3<f64>, f64) {
+        let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
+        let v = axis.cross(&u);
+        let flat: Vec<[f64; 2]> = self.corners.iter().map(|p| [u.dot(p), v.dot(p)]).collect();
+        let (low, high) = span(self.corners.iter().map(|p| axis.dot(p)));
+        let height = (high - low).max(min_extent);
+        let outline: Vec<[f64; 2]> = planar_hull(&flat).iter().map(|&i| flat[i as usize]).collect();
+        let mut best = (Matrix3::from_columns(&[*axis, u, v]), f64::INFINITY);
+        for (i, p) in outline.iter().enumerate() {
+            let q = outline[(i + 1) % outline.len()];
+            let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+            let d = if length > 1e-9 {
+                [(q[0] - p[0]) / length, (q[1] - p[1]) / length]
+            } else if outline.len() < 3 {
+                [1.0, 0.0]
+            } else {
+                continue;
+            };
+            let (low, high) = span(outline.iter().map(|c| d[0] * c[0] + d[1] * c[1]));
+            let (near, far) = span(outline.iter().map(|c| d[0] * c[1] - d[1] * c[0]));
+            let volume = height * (high - low).max(min_extent) * (far - near).max(min_extent);
+            if volume < best.1 {
+                let along = u * d[0] + v * d[1];
+                best = (Matrix3::from_columns(&[*axis, along, axis.cross(&along)]), volume);
+            }
+        }
+        best
+    }
+
+    fn volume_along(&self, axes: &Matrix3<f64>, min_extent: f64) -> f64 {
+        (0..3)
+            .map(|k| span(self.corners.iter().map(|p| axes.column(k).dot(p))))
+            .map(|(low, high)| (high - low).max(min_extent))
+            .product()
+    }
+
+    /// The box around all points with these axes.
+    fn around(&self, axes: &Matrix3<f64>, min_extent: f64) -> OrientedBox {
+        let spans = [0, 1, 2].map(|k| span(self.points.iter().map(|p| axes.column(k).dot(&p.coords))));
+        let center = Vector3::from(spans.map(|(low, high)| f64::midpoint(low, high)));
+        let extents = Vector3::from(spans.map(|(low, high)| (high - low).max(min_extent)));
+        OrientedBox::new(
+            (axes * center).into(),
+            Rotation3::from_matrix_unchecked(*axes),
+            extents,
+        )
+        .expect("the smallest extent is positive and the points are finite")
+    }
+}
+
+fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+        (low.min(x), high.max(x))
+    })
+}
+
+fn lattice() -> impl Iterator<Item = Vector3<f64>> {
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..N_LATTICE).map(move |i| {
+        let z = (i as f64 + 0.5) / N_LATTICE as f64;
+        let (sin, cos) = (golden_angle * i as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        Vector3::new(r * cos, r * sin, z)
+    })
+}
