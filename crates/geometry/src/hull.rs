@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::GeometryError;
 use crate::planar::planar_hull;
-use quickhull::{Simplex, initial_simplex, quickhull};
+use quickhull::{Simplex, initial_simplex, quickhull, redundant_corners};
 
 /// How far outside the hull an input point may lie, relative to half the longest side of the points' bounds.
 ///
@@ -111,7 +111,7 @@ pub(crate) fn hull_within(points: &[Point3<f64>], tolerance: f64) -> ConvexHull 
             let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
             used.sort_unstable();
             used.dedup();
-            (used, triangles, 3)
+            without_redundant(&unit, used, triangles, tolerance)
         }
         Simplex::Flat([a, b, c]) => {
             let (u, v) = plane_basis(&unit, a, b, c);
@@ -135,6 +135,37 @@ pub(crate) fn hull_within(points: &[Point3<f64>], tolerance: f64) -> ConvexHull 
             .map(|t| t.map(|v| new_index[v as usize]))
             .collect(),
         rank,
+    }
+}
+
+/// The hull's corners and triangles once corners inside its faces and edges are left out; and its rank.
+fn without_redundant(
+    unit: &[Vector3<f64>],
+    mut used: Vec<u32>,
+    mut triangles: Vec<[u32; 3]>,
+    tolerance: f64,
+) -> (Vec<u32>, Vec<[u32; 3]>, usize) {
+    loop {
+        let redundant = redundant_corners(unit, &triangles);
+        if redundant.is_empty() {
+            return (used, triangles, 3);
+        }
+        let kept: Vec<u32> = used
+            .iter()
+            .copied()
+            .filter(|i| redundant.binary_search(i).is_err())
+            .collect();
+        let corners: Vec<Vector3<f64>> = kept.iter().map(|&i| unit[i as usize]).collect();
+        let Simplex::Solid(simplex) = initial_simplex(&corners) else {
+            return (used, triangles, 3);
+        };
+        triangles = quickhull(&corners, simplex, tolerance)
+            .iter()
+            .map(|t| t.map(|i| kept[i as usize]))
+            .collect();
+        used = triangles.iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
     }
 }
 

@@ -6,6 +6,13 @@ use robust::{Coord3D, orient3d};
 /// Below this distance (points fill the cube from −1 to 1) points count as coplanar, collinear or equal.
 const RANK_TOLERANCE: f64 = 1e-10;
 
+/// Of points equally far away, one inside a face or an edge of the hull would make a poor corner. This share of the
+/// squared distance from the origin, added to distances, prefers true corners: the sum is strictly convex.
+const CONVEXITY: f64 = 1e-9;
+
+/// A corner that stands out from its neighbours by less than this is redundant; well below any tolerance for hulls.
+const REDUNDANT: f64 = 1e-11;
+
 /// As many of the points as are needed to span them: the largest simplex found greedily.
 pub(super) enum Simplex {
     Solid([u32; 4]),
@@ -36,12 +43,16 @@ pub(super) fn initial_simplex(points: &[Vector3<f64>]) -> Simplex {
         return Simplex::Point(a);
     }
     let along = (points[b as usize] - pa).normalize();
-    let (c, squared) = far(&|p| along.cross(&(p - pa)).norm_squared());
-    if squared.sqrt() <= RANK_TOLERANCE {
+    let from_line = |p: &Vector3<f64>| along.cross(&(p - pa)).norm();
+    let (_, width) = far(&from_line);
+    if width <= RANK_TOLERANCE {
         return Simplex::Segment([a, b]);
     }
+    let (c, _) = far(&|p| from_line(p) + CONVEXITY * width * p.norm_squared());
     let normal = along.cross(&(points[c as usize] - pa)).normalize();
-    let (d, height) = far(&|p| normal.dot(&(p - pa)).abs());
+    let from_plane = |p: &Vector3<f64>| normal.dot(&(p - pa)).abs();
+    let (_, height) = far(&from_plane);
+    let (d, _) = far(&|p| from_plane(p) + CONVEXITY * height * p.norm_squared());
     if height <= RANK_TOLERANCE {
         return Simplex::Flat([a, b, c]);
     }
@@ -73,7 +84,7 @@ struct Facet {
     normal: Vector3<f64>,
     offset: f64,
     outside: Vec<u32>,
-    /// The point of `outside` that is farthest, and how far.
+    /// The point of `outside` that is farthest, and how far, with a preference for corners.
     farthest: (u32, f64),
     alive: bool,
 }
@@ -100,12 +111,14 @@ impl Facet {
 
     /// Takes the point where it lies outside by more than the tolerance.
     fn take(&mut self, points: &[Vector3<f64>], point: u32, tolerance: f64) -> bool {
-        let distance = self.normal.dot(&points[point as usize]) - self.offset;
+        let p = &points[point as usize];
+        let distance = self.normal.dot(p) - self.offset;
         if distance <= tolerance {
             return false;
         }
-        if distance > self.farthest.1 {
-            self.farthest = (point, distance);
+        let preference = distance + CONVEXITY * p.norm_squared();
+        if preference > self.farthest.1 {
+            self.farthest = (point, preference);
         }
         self.outside.push(point);
         true
@@ -182,6 +195,43 @@ pub(super) fn quickhull(points: &[Vector3<f64>], simplex: [u32; 4], tolerance: f
         pending.extend((first_new..facets.len() as u32).rev());
     }
     facets.iter().filter(|f| f.alive).map(|f| f.corners).collect()
+}
+
+/// Corners of a hull that lie inside a face or an edge of it up to rounding; no two of them neighbours.
+///
+/// A true corner is the only farthest point in the mean direction of its facets' normals.
+pub(super) fn redundant_corners(points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut mean = vec![Vector3::<f64>::zeros(); points.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|i| points[i as usize]);
+        if let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) {
+            for &i in t {
+                mean[i as usize] += normal;
+            }
+        }
+    }
+    let mut least = vec![f64::INFINITY; points.len()];
+    let edges = || triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    for [a, b] in edges() {
+        let a = a as usize;
+        let height = mean[a].dot(&(points[a] - points[b as usize])) / mean[a].norm();
+        least[a] = least[a].min(height);
+    }
+    let is_suspect = |i: u32| least[i as usize] <= REDUNDANT;
+    let mut suspects: Vec<[u32; 2]> = edges().filter(|[a, _]| is_suspect(*a)).collect();
+    suspects.sort_unstable();
+    let mut is_kept = vec![false; points.len()];
+    let mut redundant = Vec::new();
+    for group in suspects.chunk_by(|e, f| e[0] == f[0]) {
+        let corner = group[0][0];
+        if !is_kept[corner as usize] {
+            redundant.push(corner);
+            for &[_, neighbour] in group {
+                is_kept[neighbour as usize] = true;
+            }
+        }
+    }
+    redundant
 }
 
 /// Marks the facets that see `apex` as gone and collects the edges around them.
