@@ -1,12 +1,14 @@
 //! Answers: a distribution over states, a mixture of Gaussians, or both together.
 
 use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use serde_json::{Map, Value, json};
 
 use crate::error::ModelError;
-use crate::gaussian::{Gaussian, cholesky, log_normal_in_place, log_sum_exp};
+use crate::gaussian::log_sum_exp;
 use crate::json::rows;
-use crate::sphere::log_sphere_normalizer;
+use crate::mixture::{Mixture, Term, draw};
 
 /// What was asked about.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,30 +31,6 @@ pub enum Target {
     },
 }
 
-/// One weighted piece of an answer: states of the discrete targets, a Gaussian over the continuous ones.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Term {
-    /// Natural logarithm of its share; the shares of an answer sum to 1.
-    pub log_weight: f64,
-    /// State of each discrete target, in the order asked for.
-    pub states: Vec<usize>,
-    /// Mean over the continuous targets' dimensions, in the order asked for.
-    pub mean: DVector<f64>,
-    /// Covariance of the same; zero rows for a target that was observed.
-    pub covariance: DMatrix<f64>,
-}
-
-impl From<Gaussian> for Term {
-    fn from(gaussian: Gaussian) -> Self {
-        Self {
-            log_weight: 0.0,
-            states: Vec::new(),
-            mean: gaussian.mean,
-            covariance: gaussian.covariance,
-        }
-    }
-}
-
 /// The posterior of the targets, jointly and exactly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
@@ -62,17 +40,14 @@ pub struct Answer {
     pub targets: Vec<Target>,
     /// The joint distribution: with only discrete targets one term for each joint state that is possible.
     pub terms: Vec<Term>,
-}
-
-/// A mixture of Gaussians.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mixture {
-    components: Vec<Term>,
-    factors: Vec<Option<DMatrix<f64>>>,
+    /// Most that any probability of this answer can be off, because combinations of components were too many to be
+    /// summed; 0 where the answer is exact. The density of the evidence is at most 1 / (1 − bound) times what
+    /// `log_evidence` says.
+    pub error_bound: f64,
 }
 
 impl Answer {
-    pub(crate) fn new(log_evidence: f64, targets: Vec<Target>, terms: Vec<Term>) -> Self {
+    pub(crate) fn new(log_evidence: f64, targets: Vec<Target>, terms: Vec<Term>, error_bound: f64) -> Self {
         let continuous = targets
             .iter()
             .any(|target| matches!(target, Target::Continuous { .. }));
@@ -81,6 +56,7 @@ impl Answer {
             log_evidence,
             targets,
             terms,
+            error_bound,
         }
     }
 
@@ -127,16 +103,19 @@ impl Answer {
 
     fn dimensions(&self, dims: &[usize]) -> Mixture {
         let terms = self.terms.iter().map(|term| {
-            let whole = Gaussian {
-                mean: term.mean.clone(),
-                covariance: term.covariance.clone(),
-            };
-            Term {
-                log_weight: term.log_weight,
-                ..Term::from(whole.marginal(dims))
-            }
+            let (mean, root) = (term.mean.select_rows(dims), term.root().select_rows(dims));
+            Term::new(term.log_weight, Vec::new(), mean, root)
         });
         Mixture::new(terms.collect())
+    }
+
+    /// Joint values of the targets drawn from the answer: states of the discrete ones, numbers of the continuous ones, in
+    /// the order asked for. The same seed gives the same values.
+    pub fn sample(&self, n: usize, seed: u64) -> Vec<(Vec<usize>, Vec<f64>)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..n)
+            .filter_map(|_| draw(&self.terms, &mut rng).map(|(term, point)| (term.states.clone(), point)))
+            .collect()
     }
 
     /// The answer as the commands print it: `log_evidence`, and for one target `posterior`, or `mean`, `covariance` and
@@ -154,10 +133,13 @@ impl Answer {
     ///
     /// # Errors
     ///
-    /// A point of the wrong length, points without a continuous target, [`ModelError::NoDensity`].
+    /// A point of the wrong length, points without a continuous target, [`ModelError::FlatAnswer`].
     pub fn to_json_at(&self, at: &[Vec<f64>]) -> Result<Value, ModelError> {
         let mut out = Map::new();
         out.insert("log_evidence".into(), json!(self.log_evidence));
+        if self.error_bound > 0.0 {
+            out.insert("error_bound".into(), json!(self.error_bound));
+        }
         match self.targets.as_slice() {
             [] => {}
             [only] => self.write_marginal(only, &mut out),
@@ -190,7 +172,7 @@ impl Answer {
             }
             Target::Continuous { name, .. } => {
                 if let Some(mixture) = self.mixture(name) {
-                    mixture.write(out);
+                    write_mixture(&mixture, out);
                 }
             }
         }
@@ -248,13 +230,8 @@ impl Answer {
                 });
             }
         }
-        let flat = || ModelError::NoDensity {
-            node: name.clone(),
-            configuration: 0,
-            component: mixture.first_flat(),
-        };
-        let densities: Option<Vec<f64>> = at.iter().map(|point| mixture.log_density(point)).collect();
-        let densities = densities.ok_or_else(flat)?;
+        let flat = || ModelError::FlatAnswer { node: name.clone() };
+        let densities = mixture.log_densities(at).ok_or_else(flat)?;
         if let [Target::Continuous { sphere: true, .. }] = continuous.as_slice() {
             let normalizer = mixture.log_sphere_normalizer().ok_or_else(flat)?;
             let on_sphere: Vec<f64> = densities
@@ -277,91 +254,17 @@ impl Target {
     }
 }
 
-impl Mixture {
-    fn new(components: Vec<Term>) -> Self {
-        let factors = components.iter().map(|term| cholesky(&term.covariance)).collect();
-        Self { components, factors }
-    }
-
-    /// Its components: weights, means and covariances.
-    pub fn components(&self) -> &[Term] {
-        &self.components
-    }
-
-    /// Dimension.
-    pub fn dim(&self) -> usize {
-        self.components.first().map_or(0, |term| term.mean.len())
-    }
-
-    /// Mean of the whole mixture.
-    pub fn mean(&self) -> DVector<f64> {
-        let mut mean = DVector::zeros(self.dim());
-        for term in &self.components {
-            mean += term.log_weight.exp() * &term.mean;
-        }
-        mean
-    }
-
-    /// Covariance of the whole mixture: within the components and between them.
-    pub fn covariance(&self) -> DMatrix<f64> {
-        let mean = self.mean();
-        let mut covariance = DMatrix::zeros(self.dim(), self.dim());
-        for term in &self.components {
-            let away = &term.mean - &mean;
-            covariance += term.log_weight.exp() * (&term.covariance + &away * away.transpose());
-        }
-        covariance
-    }
-
-    /// Natural logarithm of the density at a point; `None` where a component is singular.
-    pub fn log_density(&self, point: &[f64]) -> Option<f64> {
-        let mut terms = Vec::with_capacity(self.components.len());
-        for (term, factor) in self.components.iter().zip(&self.factors) {
-            let mut residual: Vec<f64> = point.iter().zip(term.mean.iter()).map(|(x, m)| x - m).collect();
-            terms.push(term.log_weight + log_normal_in_place(&mut residual, factor.as_ref()?));
-        }
-        Some(log_sum_exp(&terms))
-    }
-
-    /// log ∫ density over the unit sphere; `None` where a component is singular. `log_density` minus this is the
-    /// logarithm of the density on the sphere.
-    pub fn log_sphere_normalizer(&self) -> Option<f64> {
-        let mut terms = Vec::with_capacity(self.components.len());
-        for (term, factor) in self.components.iter().zip(&self.factors) {
-            factor.as_ref()?;
-            terms.push(term.log_weight + log_sphere_normalizer(&term.mean, &term.covariance)?);
-        }
-        Some(log_sum_exp(&terms))
-    }
-
-    /// The component mean with the highest density; `None` where a component is singular.
-    pub fn mode(&self) -> Option<DVector<f64>> {
-        let mut best: Option<(f64, &DVector<f64>)> = None;
-        for term in &self.components {
-            let density = self.log_density(term.mean.as_slice())?;
-            if best.is_none_or(|(least, _)| density > least) {
-                best = Some((density, &term.mean));
-            }
-        }
-        best.map(|(_, mean)| mean.clone())
-    }
-
-    fn first_flat(&self) -> usize {
-        self.factors.iter().position(Option::is_none).unwrap_or(0)
-    }
-
-    fn write(&self, out: &mut Map<String, Value>) {
-        out.insert("mean".into(), json!(self.mean().as_slice()));
-        out.insert("covariance".into(), json!(rows(&self.covariance())));
-        let components = self.components.iter().map(|term| {
-            json!({
-                "weight": term.log_weight.exp(),
-                "mean": term.mean.as_slice(),
-                "covariance": rows(&term.covariance),
-            })
-        });
-        out.insert("components".into(), Value::Array(components.collect()));
-    }
+fn write_mixture(mixture: &Mixture, out: &mut Map<String, Value>) {
+    out.insert("mean".into(), json!(mixture.mean().as_slice()));
+    out.insert("covariance".into(), json!(rows(&mixture.covariance())));
+    let components = mixture.components().iter().map(|term| {
+        json!({
+            "weight": term.log_weight.exp(),
+            "mean": term.mean.as_slice(),
+            "covariance": rows(&term.covariance),
+        })
+    });
+    out.insert("components".into(), Value::Array(components.collect()));
 }
 
 /// One term for each joint state.
@@ -372,11 +275,13 @@ fn merge(terms: Vec<Term>) -> Vec<Term> {
     }
     by_states
         .into_iter()
-        .map(|(states, logs)| Term {
-            log_weight: log_sum_exp(&logs),
-            states,
-            mean: DVector::zeros(0),
-            covariance: DMatrix::zeros(0, 0),
+        .map(|(states, logs)| {
+            Term::new(
+                log_sum_exp(&logs),
+                states,
+                DVector::zeros(0),
+                DMatrix::zeros(0, 0),
+            )
         })
         .collect()
 }

@@ -151,6 +151,28 @@ pub enum ModelError {
         problem: String,
     },
 
+    /// A file of another program's format has something unexpected.
+    #[error("{format} file, line {line}: found {found}, expected {expected}")]
+    TextFile {
+        /// The format.
+        format: String,
+        /// The line, from 1.
+        line: usize,
+        /// What stands there.
+        found: String,
+        /// What should stand there.
+        expected: String,
+    },
+
+    /// A model cannot be written in another program's format.
+    #[error("the model cannot be written as {format}: {problem}")]
+    Export {
+        /// The format.
+        format: String,
+        /// What stands in the way.
+        problem: String,
+    },
+
     /// A binary model file is damaged or of another kind.
     #[error("binary model file: found {found}, expected {expected}")]
     Binary {
@@ -199,6 +221,26 @@ pub enum ModelError {
     ImpossibleEvidence {
         /// Which nodes to look at.
         hint: String,
+    },
+
+    /// A continuous target has no density: some component of its posterior is singular.
+    #[error(
+        "the posterior of `{node}` has a component without spread in some direction, so it has no density at points; \
+         ask without points: its mean and covariance are there"
+    )]
+    FlatAnswer {
+        /// The targets.
+        node: String,
+    },
+
+    /// Too many combinations of components: the sum over the likeliest ones is too far from the whole.
+    #[error(
+        "this query sums so many combinations of components that only a part was taken, and its probabilities may be \
+         off by {error_bound:.1e}; observe more nodes or use fewer components"
+    )]
+    Pruned {
+        /// Most that a probability can be off.
+        error_bound: f64,
     },
 
     /// Exact elimination would take too many terms.

@@ -31,6 +31,7 @@ mod table;
 
 mod binary;
 mod cpd;
+mod interchange;
 mod json;
 mod model;
 mod sample;
@@ -44,23 +45,33 @@ mod train;
 
 mod answer;
 mod evidence;
+mod mixture;
 mod posterior;
+
+mod block;
+mod elimination;
+mod log_table;
 
 mod batch;
 mod explain;
-mod hidden_block;
 mod plan;
+mod reader;
+mod tree;
 
+mod double_double;
 mod gaussian;
+mod root_gaussian;
 mod sphere;
 
-pub use answer::{Answer, Mixture, Target, Term};
+pub use answer::{Answer, Target};
 pub use batch::{BatchQuery, RowAnswer};
 pub use cell::{CellReport, OrderScore};
 pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 pub use error::ModelError;
 pub use evidence::{Evidence, Observation};
 pub use explain::{Contrast, Explanation, MostProbable, ProbableValue};
+pub use interchange::Export;
+pub use mixture::{Mixture, Term};
 pub use model::{Model, Node};
 pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec};
 pub use table::{Column, Table};

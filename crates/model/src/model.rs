@@ -6,8 +6,8 @@ use nalgebra::DMatrix;
 use serde_json::{Map, Value};
 
 use crate::cpd::{Cpd, MixtureCpd, NodeIdx};
+use crate::double_double::{Root, covariance_root};
 use crate::error::{ModelError, list};
-use crate::gaussian::cholesky;
 
 /// Rows of tables and of mixture weights sum to 1 within this: what six printed digits of each entry allow.
 const SUM_TOLERANCE: f64 = 1e-5;
@@ -32,8 +32,8 @@ pub struct Model {
     extra: Map<String, Value>,
     order: Vec<NodeIdx>,
     names: BTreeMap<String, NodeIdx>,
-    /// Per node, configuration and component: the Cholesky factor of the covariance, `None` where singular.
-    factors: Vec<Vec<Vec<Option<DMatrix<f64>>>>>,
+    /// Per node, configuration and component: the root of the covariance.
+    factors: Vec<Vec<Vec<Root>>>,
 }
 
 impl PartialEq for Model {
@@ -136,7 +136,13 @@ impl Model {
         configuration: usize,
         component: usize,
     ) -> Option<&DMatrix<f64>> {
-        self.factors[idx.0][configuration][component].as_ref()
+        let root = &self.factors[idx.0][configuration][component];
+        (!root.singular).then_some(&root.lower)
+    }
+
+    /// Lower triangular square root of a component's covariance, singular or not.
+    pub(crate) fn root(&self, idx: NodeIdx, configuration: usize, component: usize) -> &DMatrix<f64> {
+        &self.factors[idx.0][configuration][component].lower
     }
 
     /// The mixture of a continuous node.
@@ -370,11 +376,7 @@ fn check_table(node: &Node, nodes: &[Node]) -> Result<(), ModelError> {
     Ok(())
 }
 
-fn check_mixture(
-    node: &Node,
-    cpd: &MixtureCpd,
-    nodes: &[Node],
-) -> Result<Vec<Vec<Option<DMatrix<f64>>>>, ModelError> {
+fn check_mixture(node: &Node, cpd: &MixtureCpd, nodes: &[Node]) -> Result<Vec<Vec<Root>>, ModelError> {
     let n_rows = n_configurations(node, nodes)?;
     let place = || format!("node `{}`", node.name);
     let mut q = 0;
@@ -449,11 +451,7 @@ fn check_mixture(
     Ok(factors)
 }
 
-fn check_component(
-    component: &crate::cpd::Component,
-    d: usize,
-    q: usize,
-) -> Result<Option<DMatrix<f64>>, String> {
+fn check_component(component: &crate::cpd::Component, d: usize, q: usize) -> Result<Root, String> {
     let covariance = &component.covariance;
     if !(component.weight >= 0.0 && component.weight.is_finite()) {
         return Err(format!(
@@ -490,8 +488,8 @@ fn check_component(
     if (covariance - covariance.transpose()).amax() > SYMMETRY_TOLERANCE * largest {
         return Err("`covariance` is not symmetric".into());
     }
-    let factor = cholesky(covariance);
-    if factor.is_none() {
+    let factor = covariance_root(covariance);
+    if factor.singular {
         let least = covariance.clone().symmetric_eigenvalues().min();
         if least < -SYMMETRY_TOLERANCE * largest {
             return Err(format!("`covariance` has the negative eigenvalue {least:.3e}"));
