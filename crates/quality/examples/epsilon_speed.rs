@@ -9,27 +9,29 @@
 use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
-use prehend_quality::{
-    Contact, EpsilonSolver, GraspWrenchSpace, QualityError, QualityOptions, grasp_quality_with,
-};
+use prehend_quality::{ConeShape, Contact, EpsilonSolver, QualityError, QualityOptions, grasp_quality_with};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn main() -> Result<(), QualityError> {
-    println!(
-        "{:>8} {:>5} {:>6} {:>9} {:>9} {:>9} {:>9}",
-        "contacts", "edges", "held %", "ε held", "ε loose", "all held", "all loose"
-    );
-    for (n_contacts, cone_edges) in [(3, 8), (4, 8), (6, 8), (8, 8), (12, 8), (20, 8), (8, 32)] {
+    println!("median µs    contacts  cone          held %    ε held   ε loose  all held all loose");
+    let mut solver = EpsilonSolver::default();
+    for (n_contacts, cone) in [3, 4, 8, 12, 16, 20]
+        .map(|n| (n, ConeShape::Edges(8)))
+        .into_iter()
+        .chain([
+            (8, ConeShape::Edges(32)),
+            (4, ConeShape::Smooth),
+            (8, ConeShape::Smooth),
+        ])
+    {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let mut solver = EpsilonSolver::default();
         let options = QualityOptions {
-            cone_edges,
+            cone,
             ..QualityOptions::new(Point3::origin(), 0.05)
         };
-        // Seconds and grasps, loose and held.
-        let mut tally = [(0.0, 0.0, 0_u32); 2];
-        for _ in 0..300 {
+        let (mut only, mut all) = ([vec![], vec![]], [vec![], vec![]]);
+        for _ in 0..200 {
             let contacts: Vec<Contact> = (0..n_contacts)
                 .map(|i| {
                     let z: f64 = rng.random_range(-1.0..1.0);
@@ -40,26 +42,24 @@ fn main() -> Result<(), QualityError> {
                 })
                 .collect::<Result<_, _>>()?;
             let begin = Instant::now();
-            let space = GraspWrenchSpace::new(&contacts, &options)?;
-            let epsilon = solver.epsilon(&space)?;
-            let middle = Instant::now();
+            let held = usize::from(solver.epsilon_of(&contacts, &options)? > 0.0);
+            only[held].push(begin.elapsed());
+            let begin = Instant::now();
             grasp_quality_with(&contacts, &options, &mut solver)?;
-            let (only, all, count) = &mut tally[usize::from(epsilon > 0.0)];
-            *only += (middle - begin).as_secs_f64();
-            *all += middle.elapsed().as_secs_f64();
-            *count += 1;
+            all[held].push(begin.elapsed());
         }
-        let [loose, held] = tally.map(|(only, all, count)| {
-            let per_grasp = 1e6 / f64::from(count.max(1));
-            (only * per_grasp, all * per_grasp, count)
+        let held = only[1].len() / 2;
+        let [a, b, c, d] = [&only[1], &only[0], &all[1], &all[0]].map(|times| {
+            let mut times = times.clone();
+            times.sort();
+            times
+                .get(times.len() / 2)
+                .map_or(f64::NAN, |t| 1e6 * t.as_secs_f64())
         });
         println!(
-            "{n_contacts:8} {cone_edges:5} {:6} {:9.1} {:9.1} {:9.1} {:9.1}",
-            held.2 / 3,
-            held.0,
-            loose.0,
-            held.1,
-            loose.1
+            "{:12} {n_contacts:8}  {:12} {held:7} {a:9.1} {b:9.1} {c:9.1} {d:9.1}",
+            "",
+            format!("{cone:?}")
         );
     }
     Ok(())

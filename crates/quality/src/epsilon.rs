@@ -3,9 +3,9 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
-use crate::polytope::{FacetId, Polytope, sub};
-use crate::wrench_space::dot;
-use crate::{GraspWrenchSpace, QualityError};
+use crate::polytope::{FacetId, Polytope};
+use crate::start::{Least, first_simplex};
+use crate::{Contact, GraspWrenchSpace, QualityError, QualityOptions, Wrench};
 
 /// Radius of the largest origin-centred ball inside the grasp wrench space; 0 without force closure.
 ///
@@ -26,6 +26,22 @@ pub fn epsilon(space: &GraspWrenchSpace) -> Result<f64, QualityError> {
 /// Share of the largest wrench norm that ε must exceed to count as force closure.
 pub const FORCE_CLOSURE_TOLERANCE: f64 = 1e-9;
 
+/// How near its two bounds [`EpsilonSolver::epsilon`] brings ε where a contact is smooth, as a share of the largest
+/// wrench norm.
+pub const SMOOTH_TOLERANCE: f64 = 1e-4;
+
+/// What is known of ε: `lower` ≤ ε ≤ `upper`.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct EpsilonBounds {
+    /// Radius of a ball that is proven to lie inside the space; 0 or more.
+    pub lower: f64,
+    /// How far the space reaches against `limiting_wrench`: no larger ball fits. 0 without force closure.
+    pub upper: f64,
+    /// The disturbance, of norm 1, that the contacts resist least: they can answer `upper` × this much of it and no
+    /// more. Without force closure, one that they cannot answer at all.
+    pub limiting_wrench: Wrench,
+}
+
 /// Computes [`epsilon`], and keeps its memory from one grasp to the next. The result does not depend on earlier calls.
 ///
 /// ```text
@@ -38,95 +54,219 @@ pub const FORCE_CLOSURE_TOLERANCE: f64 = 1e-9;
 /// ```
 ///
 /// A few dozen points decide; the whole hull, thousands of facets, is never built. Exact to 1e-12 of the largest wrench
-/// norm (times the number of contacts for L∞).
+/// norm (times the number of contacts for L∞) where all cones have edges. Every round adds a point of the space that was
+/// not in P before, so with edges it ends after at most as many rounds as there are wrenches; a bound on the facets
+/// stops the rest.
 #[derive(Debug, Clone, Default)]
 pub struct EpsilonSolver {
-    polytope: Polytope,
-    queue: BinaryHeap<Reverse<Candidate>>,
-    support_points: Vec<[f64; 6]>,
+    growth: Growth<6>,
+    space: Option<GraspWrenchSpace>,
 }
 
 impl EpsilonSolver {
-    /// See [`epsilon`].
+    /// See [`epsilon`]. With smooth contacts, the lower of two bounds that are [`SMOOTH_TOLERANCE`] apart.
     ///
     /// # Errors
     ///
     /// As [`epsilon`].
     pub fn epsilon(&mut self, space: &GraspWrenchSpace) -> Result<f64, QualityError> {
-        let scaled = self.grow(space, MOST_FACETS)?;
-        Ok(if scaled > FORCE_CLOSURE_TOLERANCE {
-            scaled * space.largest_norm()
+        let bounds = self.bounds(space)?;
+        // Both bounds agree where all cones have edges; the upper one is a support value, free of the facet's rounding.
+        Ok(if space.is_polyhedral() {
+            bounds.upper
         } else {
-            0.0
+            bounds.lower
         })
     }
 
-    /// ε of the scaled space; anything up to the tolerance means that there is no force closure.
-    fn grow(&mut self, space: &GraspWrenchSpace, most_facets: usize) -> Result<f64, QualityError> {
+    /// ε of contacts, without making a [`GraspWrenchSpace`] anew: allocates nothing once the solver has seen grasps of
+    /// this size.
+    ///
+    /// # Errors
+    ///
+    /// As [`GraspWrenchSpace::new`] and [`epsilon`].
+    pub fn epsilon_of(
+        &mut self,
+        contacts: &[Contact],
+        options: &QualityOptions,
+    ) -> Result<f64, QualityError> {
+        let space = match self.space.take() {
+            Some(mut space) => {
+                space.fill(contacts, options)?;
+                space
+            }
+            None => GraspWrenchSpace::new(contacts, options)?,
+        };
+        let epsilon = self.epsilon(&space);
+        self.space = Some(space);
+        epsilon
+    }
+
+    /// The bounds that [`Self::epsilon`] ends with, and the worst direction.
+    ///
+    /// # Errors
+    ///
+    /// As [`epsilon`].
+    pub fn bounds(&mut self, space: &GraspWrenchSpace) -> Result<EpsilonBounds, QualityError> {
+        let tolerance = if space.is_polyhedral() {
+            TOLERANCE * space.scaled_size()
+        } else {
+            SMOOTH_TOLERANCE
+        };
+        self.solve(space, &Goal::new(tolerance))
+    }
+
+    /// ε to `tolerance` (in ε's own unit): stops as soon as the bounds are that near.
+    ///
+    /// Without force closure both bounds are 0. A tolerance finer than rounding allows gives bounds that are 1e-12 of the
+    /// largest wrench norm apart.
+    ///
+    /// # Errors
+    ///
+    /// [`QualityError::BadTolerance`] unless it is positive and finite; and as [`epsilon`], which a smooth cone and a
+    /// very fine tolerance can bring about.
+    pub fn epsilon_within(
+        &mut self,
+        space: &GraspWrenchSpace,
+        tolerance: f64,
+    ) -> Result<EpsilonBounds, QualityError> {
+        if !(tolerance.is_finite() && tolerance > 0.0) {
+            return Err(QualityError::BadTolerance { tolerance });
+        }
+        let finest = TOLERANCE * space.scaled_size();
+        let goal = Goal::new((tolerance / space.largest_norm()).max(finest));
+        self.solve(space, &goal)
+    }
+
+    /// Whether ε reaches `bound`, to 1e-12 of the largest wrench norm: stops as soon as either answer is sure. True for
+    /// any bound up to 0.
+    ///
+    /// # Errors
+    ///
+    /// As [`epsilon`].
+    pub fn epsilon_at_least(&mut self, space: &GraspWrenchSpace, bound: f64) -> Result<bool, QualityError> {
+        if bound <= 0.0 {
+            return Ok(true);
+        }
         let tolerance = TOLERANCE * space.scaled_size();
-        // The least support seen in any direction: ε is never above it.
-        let mut upper = f64::INFINITY;
-        if !self.start(space, FORCE_CLOSURE_TOLERANCE, &mut upper) {
-            return Ok(0.0);
+        let scaled = bound / space.largest_norm();
+        let goal = Goal {
+            too_little: (scaled - tolerance).max(FORCE_CLOSURE_TOLERANCE),
+            enough: scaled - tolerance,
+            tolerance,
+        };
+        let bounds = self.solve(space, &goal)?;
+        Ok(bounds.lower >= bound - tolerance * space.largest_norm())
+    }
+
+    fn solve(&mut self, space: &GraspWrenchSpace, goal: &Goal) -> Result<EpsilonBounds, QualityError> {
+        let (lower, least) = match space.n_axes() {
+            2 => Growth::<2>::default().run(space, goal),
+            3 => Growth::<3>::default().run(space, goal),
+            4 => Growth::<4>::default().run(space, goal),
+            5 => Growth::<5>::default().run(space, goal),
+            _ => self.growth.run(space, goal),
+        }?;
+        let size = space.largest_norm();
+        let closed = least.reach > FORCE_CLOSURE_TOLERANCE;
+        Ok(EpsilonBounds {
+            lower: if closed { lower.max(0.0) * size } else { 0.0 },
+            upper: if closed { least.reach * size } else { 0.0 },
+            limiting_wrench: -space.coordinates().wrench(&least.direction),
+        })
+    }
+}
+
+/// When to stop, in scaled units.
+#[derive(Debug, Clone, Copy)]
+struct Goal {
+    /// ε is known not to exceed this.
+    too_little: f64,
+    /// ε is known to reach this.
+    enough: f64,
+    /// The bounds are this near.
+    tolerance: f64,
+}
+
+impl Goal {
+    fn new(tolerance: f64) -> Self {
+        Self {
+            too_little: FORCE_CLOSURE_TOLERANCE,
+            enough: f64::INFINITY,
+            tolerance,
+        }
+    }
+}
+
+/// ε is exact to this, in units of the largest wrench norm.
+pub(crate) const TOLERANCE: f64 = 1e-12;
+/// A facet sees a point that is higher than this; well below `TOLERANCE`, so that a facet that asks for a point sees it.
+pub(crate) const SEEN_TOLERANCE: f64 = 1e-13;
+/// More facets than any sensible grasp asks for (200 contacts: a few thousand); bounds time and memory.
+const MOST_FACETS: usize = 400_000;
+
+/// The polytope inside the space and its facets in the order of their distance.
+#[derive(Debug, Clone, Default)]
+struct Growth<const D: usize> {
+    polytope: Polytope<D>,
+    queue: BinaryHeap<Reverse<Candidate>>,
+}
+
+impl<const D: usize> Growth<D> {
+    /// A lower bound, and the direction of the least upper bound.
+    fn run(&mut self, space: &GraspWrenchSpace, goal: &Goal) -> Result<(f64, Least), QualityError> {
+        let flat = TOLERANCE * space.scaled_size();
+        let mut least = Least::new();
+        let simplex = first_simplex(space, &mut least, goal.too_little, flat);
+        let started = simplex.is_some_and(|simplex| {
+            let simplex = simplex.map(|p| shorter(&p));
+            self.polytope
+                .reset(&simplex[..=D], SEEN_TOLERANCE * space.scaled_size())
+        });
+        if !started {
+            // A flat space reaches nowhere along its normal, whatever was seen of it.
+            if least.reach > goal.too_little {
+                least.reach = 0.0;
+            }
+            return Ok((0.0, least));
         }
         self.queue.clear();
-        self.queue_created(upper);
+        self.queue_created(least.reach);
+        // Facets whose rounding cannot be mended keep the lower bound down.
+        let mut doubtful = f64::INFINITY;
         while let Some(Reverse(candidate)) = self.queue.pop() {
             let id = candidate.id;
-            let Some(&plane) = self.polytope.plane(id) else {
+            let Some(plane) = self.polytope.plane(id).copied() else {
                 continue;
             };
-            if candidate.offset >= upper - tolerance {
-                break;
+            let known = candidate.offset.min(least.reach).min(doubtful);
+            if candidate.offset >= least.reach - goal.tolerance || known >= goal.enough {
+                return Ok((known, least));
             }
-            // The winning facet deserves the better plane; if that lies farther out, others go first.
-            if !candidate.refined {
+            let direction = longer(&plane.normal);
+            let (reach, point) = space.scaled_support(&direction);
+            least.see(reach, &direction);
+            if least.reach <= goal.too_little {
+                return Ok((known, least));
+            }
+            let point = shorter(&point);
+            if plane.height(&point) > flat && !self.polytope.has_point(&point) {
+                self.polytope.insert(&point, id, "epsilon", MOST_FACETS)?;
+                self.queue_created(least.reach);
+            } else if candidate.refined {
+                doubtful = doubtful.min(candidate.offset);
+            } else {
+                // Nothing lies beyond: the facet deserves the better plane before it decides.
                 self.polytope.refine(id);
                 let offset = self.polytope.plane(id).map_or(plane.offset, |p| p.offset);
-                if offset > candidate.offset + tolerance {
-                    self.queue.push(Reverse(Candidate {
-                        offset,
-                        id,
-                        refined: true,
-                    }));
-                    continue;
-                }
+                self.queue.push(Reverse(Candidate {
+                    offset,
+                    id,
+                    refined: true,
+                }));
             }
-            let Some(&plane) = self.polytope.plane(id) else {
-                continue;
-            };
-            let (support, point) = space.scaled_support(&plane.normal);
-            upper = upper.min(support);
-            if upper <= FORCE_CLOSURE_TOLERANCE {
-                return Ok(0.0);
-            }
-            // A corner of its own facet beyond it is rounding, not a new point.
-            if plane.height(&point) <= tolerance || self.polytope.has_corner(id, &point) {
-                continue;
-            }
-            if self.polytope.n_facets() > most_facets {
-                return Err(QualityError::TooManyFacets {
-                    what: "epsilon",
-                    facets: most_facets,
-                });
-            }
-            self.polytope.insert(&point, id);
-            self.queue_created(upper);
         }
-        Ok(upper)
-    }
-
-    /// Grows a simplex of support points; false as soon as some direction shows that the space reaches no farther than
-    /// `least` (a flat space always does).
-    fn start(&mut self, space: &GraspWrenchSpace, least: f64, upper: &mut f64) -> bool {
-        first_simplex(space, &mut self.support_points, |reach| {
-            *upper = upper.min(reach);
-            reach > least
-        })
-        .is_some_and(|simplex| {
-            self.polytope
-                .reset(&simplex, SEEN_TOLERANCE * space.scaled_size())
-        })
+        Ok((least.reach.min(doubtful), least))
     }
 
     fn queue_created(&mut self, upper: f64) {
@@ -144,99 +284,14 @@ impl EpsilonSolver {
     }
 }
 
-/// ε is exact to this, in units of the largest wrench norm.
-pub(crate) const TOLERANCE: f64 = 1e-12;
-/// A facet sees a point that is higher than this; well below `TOLERANCE`, so that a facet that asks for a point sees it.
-pub(crate) const SEEN_TOLERANCE: f64 = 1e-13;
-/// More facets than any sensible grasp asks for (200 contacts: a few thousand); bounds time and memory.
-const MOST_FACETS: usize = 400_000;
-
-/// Seven affinely independent points of the space, each about as far from the span of the ones before as can be.
-///
-/// `keep_going` is told how far the space reaches in each direction that is tried, and may stop the search. None where
-/// it does, or where the space is flat.
-pub(crate) fn first_simplex(
-    space: &GraspWrenchSpace,
-    seen: &mut Vec<[f64; 6]>,
-    mut keep_going: impl FnMut(f64) -> bool,
-) -> Option<[[f64; 6]; 7]> {
-    seen.clear();
-    let mut ask = |direction: &[f64; 6], seen: &mut Vec<[f64; 6]>| {
-        let (reach, point) = space.scaled_support(direction);
-        seen.push(point);
-        keep_going(reach)
-    };
-    // Most grasps without force closure push to one side: the direction against all of them tells at once.
-    let mut against = [0.0; 6];
-    for wrench in space.wrenches() {
-        for k in 0..6 {
-            against[k] -= wrench[k];
-        }
-    }
-    let length = dot(&against, &against).sqrt();
-    if length > 0.0 && !ask(&against.map(|c| c / length), seen) {
-        return None;
-    }
-    for direction in complement(&[]) {
-        for sign in [1.0, -1.0] {
-            if !ask(&direction.map(|c| sign * c), seen) {
-                return None;
-            }
-        }
-    }
-    let mut simplex = [[0.0; 6]; 7];
-    simplex[0] = *seen.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))?;
-    let mut span: Vec<[f64; 6]> = Vec::with_capacity(6);
-    for n_points in 1..7 {
-        if n_points > 1 {
-            for direction in complement(&span) {
-                for sign in [1.0, -1.0] {
-                    if !ask(&direction.map(|c| sign * c), seen) {
-                        return None;
-                    }
-                }
-            }
-        }
-        let off_span = |p: &[f64; 6]| remove_span(sub(p, &simplex[0]), &span);
-        let farthest = seen
-            .iter()
-            .map(|p| (*p, off_span(p)))
-            .max_by(|(_, a), (_, b)| dot(a, a).total_cmp(&dot(b, b)))?;
-        let length = dot(&farthest.1, &farthest.1).sqrt();
-        if length <= TOLERANCE * space.scaled_size() {
-            return None;
-        }
-        simplex[n_points] = farthest.0;
-        span.push(farthest.1.map(|c| c / length));
-    }
-    Some(simplex)
+/// Coordinates that count.
+pub(crate) fn shorter<const D: usize>(point: &[f64; 6]) -> [f64; D] {
+    std::array::from_fn(|k| point[k])
 }
 
-/// Orthonormal directions that are orthogonal to `span`, built from the coordinate axes that stand farthest off it.
-fn complement(span: &[[f64; 6]]) -> Vec<[f64; 6]> {
-    let mut all = span.to_vec();
-    for _ in span.len()..6 {
-        let axes = (0..6).map(|k| remove_span(std::array::from_fn(|i| f64::from(u8::from(i == k))), &all));
-        let best = axes
-            .max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))
-            .expect("there are six axes");
-        let length = dot(&best, &best).sqrt();
-        all.push(best.map(|c| c / length));
-    }
-    all.split_off(span.len())
-}
-
-/// What is left of `v` off the orthonormal `span`; twice is enough (Gram–Schmidt with reorthogonalisation).
-fn remove_span(mut v: [f64; 6], span: &[[f64; 6]]) -> [f64; 6] {
-    for _ in 0..2 {
-        for s in span {
-            let along = dot(&v, s);
-            for k in 0..6 {
-                v[k] -= along * s[k];
-            }
-        }
-    }
-    v
+/// Coordinates filled up with zeros.
+pub(crate) fn longer<const D: usize>(point: &[f64; D]) -> [f64; 6] {
+    std::array::from_fn(|k| if k < D { point[k] } else { 0.0 })
 }
 
 /// A facet that waits, ordered by its offset, then by its place, so that ties never depend on history.
@@ -266,3 +321,108 @@ impl PartialEq for Candidate {
 }
 
 impl Eq for Candidate {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ConeShape;
+    use nalgebra::{Point3, Vector3};
+
+    /// `n` contacts spread over a ball by the golden angle, turned by `shift`.
+    fn ball(n: usize, shift: f64) -> Vec<Contact> {
+        (0..n)
+            .map(|i| {
+                let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+                let turn = i as f64 * 2.399_963 + shift * (i * i) as f64;
+                let r = (1.0 - z * z).sqrt();
+                let out = Vector3::new(r * turn.cos(), r * turn.sin(), z);
+                Contact::new(i, Point3::from(out), -out, 0.5, 0.0).unwrap()
+            })
+            .collect()
+    }
+
+    fn options() -> QualityOptions {
+        QualityOptions::new(Point3::origin(), 1.0)
+    }
+
+    #[test]
+    fn bounds_hold_epsilon_and_stop_early() {
+        let mut solver = EpsilonSolver::default();
+        for shift in [0.0, 0.3, 0.7, 1.1] {
+            let space = GraspWrenchSpace::new(&ball(6, shift), &options()).unwrap();
+            let exact = solver.epsilon(&space).unwrap();
+            for tolerance in [1e-12, 1e-6, 1e-2, 0.1, 10.0] {
+                let bounds = solver.epsilon_within(&space, tolerance).unwrap();
+                assert!(bounds.lower <= exact + 1e-12 && exact <= bounds.upper + 1e-12);
+                assert!(bounds.upper - bounds.lower <= tolerance + 1e-12);
+            }
+            for share in [0.0, 0.5, 0.99, 1.0 - 1e-9] {
+                assert!(solver.epsilon_at_least(&space, share * exact).unwrap());
+            }
+            for share in [1.0 + 1e-9, 1.01, 2.0, 1e9] {
+                let bound = share * exact + 1e-11;
+                assert!(!solver.epsilon_at_least(&space, bound).unwrap());
+            }
+        }
+    }
+
+    #[test]
+    fn the_space_reaches_epsilon_against_the_limiting_wrench() {
+        let mut solver = EpsilonSolver::default();
+        for shift in [0.0, 0.3, 0.7, 1.1] {
+            let space = GraspWrenchSpace::new(&ball(7, shift), &options()).unwrap();
+            let bounds = solver.bounds(&space).unwrap();
+            assert!((bounds.limiting_wrench.norm() - 1.0).abs() < 1e-12);
+            let reach = space.support(&-bounds.limiting_wrench).0;
+            assert!((reach - bounds.upper).abs() < 1e-12 && bounds.upper > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_warm_solver_asks_for_no_more_memory() {
+        let mut solver = EpsilonSolver::default();
+        let shifts: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
+        let run = |solver: &mut EpsilonSolver| {
+            for &shift in &shifts {
+                solver.epsilon_of(&ball(8, shift), &options()).unwrap();
+            }
+        };
+        run(&mut solver);
+        let sizes = |s: &EpsilonSolver| (s.growth.polytope.capacities(), s.growth.queue.capacity());
+        let warm = sizes(&solver);
+        run(&mut solver);
+        assert_eq!(sizes(&solver), warm);
+    }
+
+    #[test]
+    fn smooth_cones_lie_between_their_edges_and_a_wider_cone() {
+        let mut solver = EpsilonSolver::default();
+        let smooth = QualityOptions {
+            cone: ConeShape::Smooth,
+            ..options()
+        };
+        let space = GraspWrenchSpace::new(&ball(5, 0.3), &smooth).unwrap();
+        let bounds = solver.bounds(&space).unwrap();
+        assert!(bounds.upper - bounds.lower <= SMOOTH_TOLERANCE * space.largest_norm());
+        let edged = |edges| {
+            let options = QualityOptions {
+                cone: ConeShape::Edges(edges),
+                ..options()
+            };
+            let space = GraspWrenchSpace::new(&ball(5, 0.3), &options).unwrap();
+            EpsilonSolver::default().epsilon(&space).unwrap()
+        };
+        // 64 edges reach cos(π/64) of the round cone's friction: 0.12 % of μ |(1, 1)| less.
+        assert!(edged(64) <= bounds.upper + 1e-12);
+        assert!(edged(64) + 0.0013 * 0.5 * 2.0_f64.sqrt() >= bounds.lower);
+    }
+
+    #[test]
+    fn a_tolerance_of_nothing_is_an_error() {
+        let space = GraspWrenchSpace::new(&ball(4, 0.0), &options()).unwrap();
+        for tolerance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = EpsilonSolver::default().epsilon_within(&space, tolerance);
+            assert!(matches!(error, Err(QualityError::BadTolerance { .. })));
+        }
+    }
+}

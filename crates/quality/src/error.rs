@@ -76,6 +76,48 @@ pub enum QualityError {
         most: usize,
     },
 
+    /// The force added to every wrench is not finite.
+    #[error("the gravity force is {gravity:?}; every coordinate must be finite")]
+    BadGravity {
+        /// The offending force.
+        gravity: [f64; 3],
+    },
+
+    /// Too few coordinates of a wrench count for a ball to have a radius.
+    #[error("{found} of the wrench's six coordinates counts; expected 2 to 6")]
+    TooFewAxes {
+        /// How many count.
+        found: usize,
+    },
+
+    /// A wrench metric is no ellipsoid.
+    #[error("the wrench metric is not a finite, symmetric, positive definite 6 x 6 matrix")]
+    BadMetric,
+
+    /// A tolerance that no bounds can meet.
+    #[error("the tolerance is {tolerance}; expected a positive, finite number")]
+    BadTolerance {
+        /// The offending tolerance.
+        tolerance: f64,
+    },
+
+    /// A task asks for nothing.
+    #[error("the task has no wrenches; give at least one")]
+    NoTaskWrenches,
+
+    /// A task's wrench has no direction.
+    #[error("task wrench {wrench_idx} is {wrench:?}; expected a finite wrench other than zero")]
+    BadTaskWrench {
+        /// Index of the wrench, from 0.
+        wrench_idx: usize,
+        /// The offending wrench.
+        wrench: [f64; 6],
+    },
+
+    /// The volume of a smooth wrench space has no exact value here.
+    #[error("the volume needs cones with edges and sampled limit surfaces; give `cone` a number of edges")]
+    SmoothVolume,
+
     /// A wrench left the range of floating-point numbers.
     #[error(
         "contact {contact_idx} makes a wrench that is not finite; check its point, mu and the torque scale"

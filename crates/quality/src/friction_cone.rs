@@ -2,57 +2,114 @@
 
 use nalgebra::{Point3, Vector3, Vector6};
 
-use crate::{Contact, LengthUnit, QualityOptions};
+use crate::options::LimitSurface;
+use crate::{ConeShape, Contact, LengthUnit, QualityOptions};
 
 /// A wrench `[fx fy fz τx τy τz]` about the wrench centre, its torque divided by the torque scale.
 pub type Wrench = Vector6<f64>;
 
-/// Appends the wrenches of one contact: the edges of its friction cone, or 20 samples of its limit surface.
+/// The wrenches of one contact.
 ///
 /// ```text
 /// f = n + μ (x t₁ + y t₂)        τ = ((p − center) × f + μ t n) / torque_scale
 /// t₁ = n × e_x / |n × e_x|  (n × e_z where n is parallel to e_x)        t₂ = n × t₁
 /// ```
 ///
-/// A point contact has `(x, y, t) = (cos θ, sin θ, 0)` at `cone_edges` angles from θ = 0. A soft one samples the limit
-/// surface x² + y² + (t/e)² = 1 at the latitudes 90, 45, 0, −45, −90° with 1, 5, 8, 5, 1 longitudes: each direction is
-/// scaled onto the ellipsoid, whose third axis is counted in millimetres, whatever the unit of the points.
-pub(crate) fn push_wrenches(contact: &Contact, options: &QualityOptions, wrenches: &mut Vec<Wrench>) {
-    let Contact { at, mu, torsion } = *contact;
-    let n = at.normal.into_inner();
-    let (t1, t2) = tangents(&n);
-    let arm: Vector3<f64> = at.point - options.center;
-    let mut push = |x: f64, y: f64, t: f64| {
-        let f = n + mu * (x * t1 + y * t2);
-        let torque = (arm.cross(&f) + mu * t * n) / options.torque_scale;
-        wrenches.push(Wrench::new(f.x, f.y, f.z, torque.x, torque.y, torque.z));
-    };
-    if torsion > 0.0 {
-        let mm = match options.length_unit {
-            LengthUnit::Metre => 1e3,
-            LengthUnit::Millimetre => 1.0,
+/// are the image of (x, y, t) under an affine map: the centre, and one axis each.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ContactWrenches {
+    center: Wrench,
+    axes: [Wrench; 3],
+    /// e, the third semi-axis of the limit surface; 0 for a point contact.
+    torsion: f64,
+    frictionless: bool,
+}
+
+/// What the contact's (x, y, t) range over.
+pub(crate) enum Shape {
+    /// Finitely many wrenches, in their order.
+    Listed,
+    /// The ball that the axes span about the centre, both already scaled; one axis may be 0.
+    Ball { center: Wrench, axes: [Wrench; 3] },
+}
+
+impl ContactWrenches {
+    pub(crate) fn new(contact: &Contact, options: &QualityOptions) -> Self {
+        let Contact { at, mu, torsion } = *contact;
+        let n = at.normal.into_inner();
+        let (t1, t2) = tangents(&n);
+        let arm: Vector3<f64> = at.point - options.center;
+        let wrench = |f: Vector3<f64>, free_torque: Vector3<f64>| {
+            let torque = (arm.cross(&f) + free_torque) / options.torque_scale;
+            Wrench::new(f.x, f.y, f.z, torque.x, torque.y, torque.z)
         };
-        for [x, y, t] in limit_surface_samples(torsion * mm) {
-            push(x, y, t / mm);
+        let none = Vector3::zeros();
+        let mut center = wrench(n, none);
+        for k in 0..3 {
+            center[k] += options.gravity[k];
         }
-    } else {
-        for edge in 0..options.cone_edges {
-            let (sin, cos) = turn(edge, options.cone_edges);
-            push(cos, sin, 0.0);
+        Self {
+            center,
+            axes: [wrench(mu * t1, none), wrench(mu * t2, none), wrench(none, mu * n)],
+            torsion,
+            frictionless: mu == 0.0,
+        }
+    }
+
+    pub(crate) fn shape(&self, options: &QualityOptions) -> Shape {
+        let [x, y, t] = self.axes;
+        let soft = self.torsion > 0.0;
+        let smooth = if soft {
+            options.limit_surface == LimitSurface::Ellipsoid
+        } else {
+            options.cone == ConeShape::Smooth
+        };
+        if smooth && !self.frictionless {
+            Shape::Ball {
+                center: self.center,
+                axes: [x, y, t * self.torsion],
+            }
+        } else {
+            Shape::Listed
+        }
+    }
+
+    /// Appends the listed wrenches: the edges of the friction cone, or 20 samples of the limit surface. Without friction
+    /// all are one, and listed once.
+    ///
+    /// A point contact has `(x, y, t) = (cos θ, sin θ, 0)` at the angles of `circle`. A soft one samples the limit
+    /// surface x² + y² + (t/e)² = 1 at the latitudes 90, 45, 0, −45, −90° with 1, 5, 8, 5, 1 longitudes: each direction
+    /// is scaled onto the ellipsoid, whose third axis is counted in millimetres, whatever the unit of the points.
+    pub(crate) fn list(&self, circle: &[[f64; 2]], unit: LengthUnit, wrenches: &mut Vec<Wrench>) {
+        let [x_axis, y_axis, t_axis] = self.axes;
+        if self.frictionless {
+            wrenches.push(self.center);
+        } else if self.torsion > 0.0 {
+            let mm = match unit {
+                LengthUnit::Metre => 1e3,
+                LengthUnit::Millimetre => 1.0,
+            };
+            for [x, y, t] in limit_surface_samples(self.torsion * mm) {
+                wrenches.push(self.center + x_axis * x + y_axis * y + t_axis * (t / mm));
+            }
+        } else {
+            for &[x, y] in circle {
+                wrenches.push(self.center + x_axis * x + y_axis * y);
+            }
         }
     }
 }
 
-/// How many wrenches [`push_wrenches`] appends.
-pub(crate) fn n_wrenches(contact: &Contact, cone_edges: usize) -> usize {
-    if contact.torsion > 0.0 {
-        LATITUDES.iter().map(|&(_, n)| n).sum()
-    } else {
-        cone_edges
-    }
+/// Cosines and sines of the directions of a cone's edges.
+pub(crate) fn fill_circle(n_edges: usize, circle: &mut Vec<[f64; 2]>) {
+    circle.clear();
+    circle.extend((0..n_edges).map(|k| {
+        let (sin, cos) = turn(k, n_edges);
+        [cos, sin]
+    }));
 }
 
-/// The largest torque that [`push_wrenches`] could write: what rounding errors in torques compare with.
+/// The largest torque that a contact could write: what rounding errors in torques compare with.
 pub(crate) fn torque_bound(contact: &Contact, center: &Point3<f64>, torque_scale: f64) -> f64 {
     let largest_force = (1.0 + contact.mu * contact.mu).sqrt();
     ((contact.at.point - center).norm() * largest_force + contact.mu * contact.torsion) / torque_scale
@@ -122,8 +179,9 @@ mod tests {
             length_unit: unit,
             ..QualityOptions::new(Point3::origin(), 1.0)
         };
-        let mut out = Vec::new();
-        push_wrenches(&contact, &options, &mut out);
+        let (mut circle, mut out) = (Vec::new(), Vec::new());
+        fill_circle(8, &mut circle);
+        ContactWrenches::new(&contact, &options).list(&circle, unit, &mut out);
         out
     }
 

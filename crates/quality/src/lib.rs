@@ -39,6 +39,7 @@ mod error;
 mod material;
 mod soft_contact;
 
+mod coordinates;
 mod options;
 
 mod friction_cone;
@@ -47,19 +48,24 @@ mod wrench_space;
 mod hyperplane;
 mod polytope;
 
+mod start;
+
 mod epsilon;
 mod min_norm;
 mod volume;
 
 mod quality;
+mod task;
 
 pub use contact::Contact;
-pub use epsilon::{EpsilonSolver, FORCE_CLOSURE_TOLERANCE, epsilon};
+pub use coordinates::{WrenchAxes, WrenchMetric};
+pub use epsilon::{EpsilonBounds, EpsilonSolver, FORCE_CLOSURE_TOLERANCE, SMOOTH_TOLERANCE, epsilon};
 pub use error::QualityError;
 pub use friction_cone::Wrench;
 pub use material::{Material, friction_coefficient};
 pub use min_norm::origin_distance;
-pub use options::{LengthUnit, Norm, QualityOptions};
+pub use options::{ConeShape, LengthUnit, LimitSurface, Norm, QualityOptions};
 pub use quality::{Quality, grasp_quality, grasp_quality_with, wrench_rank};
 pub use soft_contact::{DEGENERATE_RADIUS, soft_torsion, soft_torsion_default};
+pub use task::{TaskScale, TaskWrenches};
 pub use wrench_space::GraspWrenchSpace;

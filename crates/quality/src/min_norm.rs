@@ -3,8 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::GraspWrenchSpace;
-use crate::polytope::sub;
-use crate::wrench_space::dot;
+use crate::hyperplane::{dot, sub};
 
 /// Distance from the origin to the wrench space; 0 where the origin lies in it (also on its boundary, to 1e-12 of the
 /// largest wrench norm). Flat spaces are as welcome as full ones.
@@ -14,28 +13,36 @@ use crate::wrench_space::dot;
 ///
 /// Source: Wolfe, "Finding the nearest point in a polytope", Mathematical Programming 11 (1976).
 pub fn origin_distance(space: &GraspWrenchSpace) -> f64 {
-    let size = space.scaled_size();
+    let x = nearest(|d| space.scaled_support(d), space.scaled_size());
+    dot(&x, &x).sqrt() * space.largest_norm()
+}
+
+/// The point nearest the origin of the convex set with this support function, whose points are about `size` long; the
+/// origin itself where it is no farther than 1e-12 × `size`.
+pub(crate) fn nearest(support: impl Fn(&[f64; 6]) -> (f64, [f64; 6]), size: f64) -> [f64; 6] {
     let tolerance = 1e-13 * size;
-    let (_, first) = space.scaled_support(&[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let (_, first) = support(&[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let mut corral = vec![(first, 1.0)];
     let mut x = first;
-    let mut best = dot(&x, &x).sqrt();
+    let mut best = x;
     // A few dozen steps are usual; the bound only stops a cycle that rounding might start.
     for _ in 0..1000 {
         let length = dot(&x, &x).sqrt();
-        best = best.min(length);
-        if length <= 10.0 * tolerance {
-            return 0.0;
+        if length < dot(&best, &best).sqrt() {
+            best = x;
         }
-        let (reach, point) = space.scaled_support(&x.map(|c| -c / length));
-        // No point of the space is nearer to the origin than −reach.
+        if length <= 10.0 * tolerance {
+            return [0.0; 6];
+        }
+        let (reach, point) = support(&x.map(|c| -c / length));
+        // No point of the set is nearer to the origin than −reach.
         if length + reach <= tolerance || corral.iter().any(|(c, _)| *c == point) {
             break;
         }
         corral.push((point, 0.0));
         x = shrink_to_nearest(&mut corral);
     }
-    best * space.largest_norm()
+    best
 }
 
 /// Drops corners until the nearest point of the corral's affine hull lies inside its convex hull; returns that point.

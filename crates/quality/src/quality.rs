@@ -3,7 +3,9 @@
 use faer::Mat;
 
 use crate::volume::volume;
-use crate::{Contact, EpsilonSolver, GraspWrenchSpace, QualityError, QualityOptions, origin_distance};
+use crate::{
+    Contact, EpsilonSolver, GraspWrenchSpace, QualityError, QualityOptions, Wrench, origin_distance,
+};
 
 /// How well contacts hold; see [`grasp_quality`].
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -14,8 +16,12 @@ pub struct Quality {
     pub force_closure: bool,
     /// Distance from the origin to the wrench space; 0 where the origin lies in it.
     pub origin_distance: f64,
-    /// Rank of the matrix of all wrenches, 1 to 6. Below 6 some push meets no resistance at all.
+    /// Rank of the matrix of all wrenches over the axes that count. Below their number (6) some push meets no resistance
+    /// at all.
     pub rank: usize,
+    /// The disturbance, of norm 1, that the contacts resist least, `[fx fy fz τx τy τz]`: they can answer ε × this much
+    /// of it. Without force closure, one that they cannot answer at all.
+    pub limiting_wrench: Wrench,
     /// Six-dimensional volume of the wrench space, where it was asked for; 0 for a flat one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume: Option<f64>,
@@ -67,13 +73,18 @@ pub fn grasp_quality_with(
     solver: &mut EpsilonSolver,
 ) -> Result<Quality, QualityError> {
     let space = GraspWrenchSpace::new(contacts, options)?;
-    let rank = wrench_rank(&space);
-    let epsilon = if rank < 6 { 0.0 } else { solver.epsilon(&space)? };
-    let force_closure = epsilon > 0.0;
-    let origin_distance = if force_closure {
-        0.0
+    let bounds = solver.bounds(&space)?;
+    let epsilon = if space.is_polyhedral() {
+        bounds.upper
     } else {
-        origin_distance(&space)
+        bounds.lower
+    };
+    let force_closure = epsilon > 0.0;
+    // A ball in the space has room along every axis, far above what the rank counts as 0.
+    let (rank, origin_distance) = if force_closure {
+        (options.axes.count(), 0.0)
+    } else {
+        (wrench_rank(&space), origin_distance(&space))
     };
     let volume = if options.volume {
         Some(volume(&space)?)
@@ -85,11 +96,12 @@ pub fn grasp_quality_with(
         force_closure,
         origin_distance,
         rank,
+        limiting_wrench: bounds.limiting_wrench,
         volume,
     })
 }
 
-/// Rank of the 6 × N matrix of wrenches.
+/// Rank of the matrix of wrenches, over the axes that count.
 ///
 /// Forces and torques are first brought to one size: torques are divided by the largest that the contacts' arms could
 /// give, so that rounding errors in vanishing torques stay small. Singular values up to 1e-11 of the largest count as 0.
@@ -97,9 +109,10 @@ pub fn wrench_rank(space: &GraspWrenchSpace) -> usize {
     let (force, torque) = space.block_sizes();
     let torque = if torque > 0.0 { torque } else { 1.0 };
     let wrenches = space.wrenches();
+    let axes = space.coordinates().axes();
     // R of Qᵀ has the singular values of the wide matrix, in a 6 × 6 block.
-    let tall = Mat::from_fn(wrenches.len(), 6, |i, k| {
-        wrenches[i][k] / if k < 3 { force } else { torque }
+    let tall = Mat::from_fn(wrenches.len(), axes.len(), |i, k| {
+        wrenches[i][axes[k]] / if axes[k] < 3 { force } else { torque }
     });
     let r = tall.qr();
     let Ok(singular_values) = r.thin_R().to_owned().singular_values() else {

@@ -2,24 +2,54 @@
 
 use std::ops::Range;
 
-use crate::friction_cone::{n_wrenches, push_wrenches, torque_bound};
-use crate::{Contact, Norm, QualityError, QualityOptions, Wrench};
+use crate::coordinates::Coordinates;
+use crate::friction_cone::{ContactWrenches, Shape, fill_circle, torque_bound};
+use crate::hyperplane::dot;
+use crate::{ConeShape, Contact, Norm, QualityError, QualityOptions, Wrench};
 
 /// The convex set of wrenches that the contacts can exert, seen through its support function.
 ///
-/// With [`Norm::L1`] it is the hull of all wrenches (the origin is not added), with [`Norm::LInf`] the Minkowski sum
-/// over the contacts i of conv({0} ∪ {w_ij}), whose support is Σᵢ max(0, maxⱼ n · w_ij). Neither hull is ever listed.
+/// With [`Norm::L1`] it is the hull of the union of the contacts' wrenches (the origin is not added), with
+/// [`Norm::LInf`] the Minkowski sum over the contacts i of conv({0} ∪ Wᵢ), whose support is Σᵢ max(0, hᵢ). Neither hull
+/// is ever listed. hᵢ, the support of one contact, is the largest n · w over its edges or samples, or for a smooth
+/// cone n · c + |Aᵀ n|, c its centre and A its two or three axes.
+///
+/// With [`QualityOptions::axes`] it is the projection on the axes that count, the other coordinates being 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspWrenchSpace {
     wrenches: Vec<Wrench>,
-    /// Which wrenches are whose, contact by contact.
-    of_contact: Vec<Range<usize>>,
+    coordinates: Coordinates,
     norm: Norm,
     largest_norm: f64,
     largest_force: f64,
     torque_bound: f64,
-    /// The wrenches divided by `largest_norm`, one array per coordinate.
-    scaled: [Vec<f64>; 6],
+    /// The listed wrenches' coordinates divided by `largest_norm`, contact by contact.
+    blocks: Vec<Block>,
+    balls: Vec<Ball>,
+    parts: Vec<Part>,
+    /// Sum of all wrenches' scaled coordinates: where most of them push.
+    sum: [f64; 6],
+    circle: Vec<[f64; 2]>,
+}
+
+/// Eight wrenches, one row per coordinate. The last block of a contact is filled up with its first wrench.
+#[derive(Debug, Clone, PartialEq)]
+struct Block([[f64; LANES]; 6]);
+
+const LANES: usize = 8;
+
+/// A smooth contact in scaled coordinates.
+#[derive(Debug, Clone, PartialEq)]
+struct Ball {
+    center: [f64; 6],
+    axes: [[f64; 6]; 3],
+}
+
+/// Where one contact's wrenches are.
+#[derive(Debug, Clone, PartialEq)]
+enum Part {
+    Blocks(Range<usize>),
+    Ball(usize),
 }
 
 impl GraspWrenchSpace {
@@ -30,76 +60,205 @@ impl GraspWrenchSpace {
     /// [`QualityError::NoContacts`]; a bad contact's error, naming it; a bad option's error; and
     /// [`QualityError::WrenchOverflow`] where finite inputs make an infinite wrench.
     pub fn new(contacts: &[Contact], options: &QualityOptions) -> Result<Self, QualityError> {
+        let mut space = Self {
+            wrenches: Vec::new(),
+            coordinates: Coordinates::new(options.axes, options.metric.as_ref())?,
+            norm: options.norm,
+            largest_norm: 1.0,
+            largest_force: 0.0,
+            torque_bound: 0.0,
+            blocks: Vec::new(),
+            balls: Vec::new(),
+            parts: Vec::new(),
+            sum: [0.0; 6],
+            circle: Vec::new(),
+        };
+        space.fill(contacts, options)?;
+        Ok(space)
+    }
+
+    /// Makes this the space of other contacts, in the memory that it has. After an error it must be filled again.
+    pub(crate) fn fill(
+        &mut self,
+        contacts: &[Contact],
+        options: &QualityOptions,
+    ) -> Result<(), QualityError> {
         options.check()?;
         if contacts.is_empty() {
             return Err(QualityError::NoContacts);
         }
-        let n_all = contacts.iter().map(|c| n_wrenches(c, options.cone_edges)).sum();
-        let mut wrenches = Vec::with_capacity(n_all);
-        let mut of_contact = Vec::with_capacity(contacts.len());
-        let mut largest_torque = 0.0_f64;
+        self.coordinates = Coordinates::new(options.axes, options.metric.as_ref())?;
+        self.norm = options.norm;
+        self.wrenches.clear();
+        self.blocks.clear();
+        self.balls.clear();
+        self.parts.clear();
+        self.torque_bound = 0.0;
+        let n_edges = match options.cone {
+            ConeShape::Edges(n) => n,
+            ConeShape::Smooth => 0,
+        };
+        if self.circle.len() != n_edges {
+            fill_circle(n_edges, &mut self.circle);
+        }
+        let mut largest_squared = 0.0_f64;
         for (contact_idx, contact) in contacts.iter().enumerate() {
             contact.check(contact_idx)?;
-            let first = wrenches.len();
-            push_wrenches(contact, options, &mut wrenches);
+            let wrenches = ContactWrenches::new(contact, options);
+            let first = self.wrenches.len();
             // The square bound keeps every dot product below in range.
-            if !wrenches[first..].iter().all(|w| w.norm_squared().is_finite()) {
+            let squared = match wrenches.shape(options) {
+                Shape::Listed => {
+                    wrenches.list(&self.circle, options.length_unit, &mut self.wrenches);
+                    self.push_blocks(first)
+                }
+                Shape::Ball { center, axes } => {
+                    self.wrenches.push(center);
+                    self.wrenches.extend(axes.map(|a| center + a));
+                    self.push_ball(&center, &axes)
+                }
+            };
+            if !squared.is_finite() {
                 return Err(QualityError::WrenchOverflow { contact_idx });
             }
-            of_contact.push(first..wrenches.len());
-            largest_torque = largest_torque.max(torque_bound(contact, &options.center, options.torque_scale));
+            largest_squared = largest_squared.max(squared);
+            let bound = torque_bound(contact, &options.center, options.torque_scale);
+            self.torque_bound = self.torque_bound.max(bound);
         }
-        // At least 1, since every normal force is.
-        let largest_norm = wrenches.iter().map(Wrench::norm).fold(0.0, f64::max);
-        let largest_force = wrenches
+        let largest_norm = largest_squared.sqrt();
+        self.largest_norm = if largest_norm > 0.0 { largest_norm } else { 1.0 };
+        self.largest_force = self
+            .wrenches
             .iter()
             .map(|w| w.fixed_rows::<3>(0).norm())
             .fold(0.0, f64::max);
-        let scaled = std::array::from_fn(|k| wrenches.iter().map(|w| w[k] / largest_norm).collect());
-        let torque_bound = largest_torque;
-        Ok(Self {
-            wrenches,
-            of_contact,
-            norm: options.norm,
-            largest_norm,
-            largest_force,
-            torque_bound,
-            scaled,
-        })
+        self.scale();
+        Ok(())
     }
 
-    /// All wrenches, contact by contact.
+    /// Stores the wrenches from `first` on as blocks; returns the largest squared norm, infinite where one is not finite.
+    fn push_blocks(&mut self, first: usize) -> f64 {
+        let start = self.blocks.len();
+        let mut largest = 0.0_f64;
+        let listed = &self.wrenches[first..];
+        for chunk in listed.chunks(LANES) {
+            let mut block = Block([[0.0; LANES]; 6]);
+            for lane in 0..LANES {
+                let point = self.coordinates.of(chunk.get(lane).unwrap_or(&listed[0]));
+                let squared = dot(&point, &point);
+                largest = if squared.is_finite() {
+                    largest.max(squared)
+                } else {
+                    f64::INFINITY
+                };
+                for k in 0..6 {
+                    block.0[k][lane] = point[k];
+                }
+            }
+            self.blocks.push(block);
+        }
+        self.parts.push(Part::Blocks(start..self.blocks.len()));
+        largest
+    }
+
+    /// Stores a smooth contact; returns a bound of its wrenches' squared norm.
+    fn push_ball(&mut self, center: &Wrench, axes: &[Wrench; 3]) -> f64 {
+        let ball = Ball {
+            center: self.coordinates.of(center),
+            axes: axes.map(|a| self.coordinates.of(&a)),
+        };
+        let reach: f64 = ball.axes.iter().map(|a| dot(a, a)).sum();
+        let bound = dot(&ball.center, &ball.center).sqrt() + reach.sqrt();
+        self.parts.push(Part::Ball(self.balls.len()));
+        self.balls.push(ball);
+        let squared = bound * bound;
+        if squared.is_finite() {
+            squared
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Divides everything stored by `largest_norm`.
+    fn scale(&mut self) {
+        let size = self.largest_norm;
+        self.sum = [0.0; 6];
+        for block in &mut self.blocks {
+            for k in 0..6 {
+                for c in &mut block.0[k] {
+                    *c /= size;
+                    self.sum[k] += *c;
+                }
+            }
+        }
+        for ball in &mut self.balls {
+            ball.center = ball.center.map(|c| c / size);
+            ball.axes = ball.axes.map(|a| a.map(|c| c / size));
+            for k in 0..6 {
+                self.sum[k] += LANES as f64 * ball.center[k];
+            }
+        }
+    }
+
+    /// Wrenches of the space, contact by contact: all edges and samples; of a smooth contact its pure normal force and
+    /// three more, which span the same.
     pub fn wrenches(&self) -> &[Wrench] {
         &self.wrenches
     }
 
-    /// Norm of the longest wrench; at least 1.
+    /// Norm of the longest wrench, by [`QualityOptions::metric`] over the axes that count (a bound of it where a contact
+    /// is smooth). Positive.
     pub fn largest_norm(&self) -> f64 {
         self.largest_norm
+    }
+
+    /// Whether the space has finitely many corners, so that ε is known exactly.
+    pub fn is_polyhedral(&self) -> bool {
+        self.balls.is_empty()
     }
 
     /// How far the space reaches along `direction`, max over its points w of direction · w, and such a point.
     /// Ties take the first wrench. `direction` should be finite.
     pub fn support(&self, direction: &Wrench) -> (f64, Wrench) {
-        let (value, point) = self.scaled_support(&(*direction).into());
-        (value * self.largest_norm, Wrench::from(point) * self.largest_norm)
+        let (value, point) = self.scaled_support(&self.coordinates.of_direction(direction));
+        (
+            value * self.largest_norm,
+            self.coordinates.wrench(&point) * self.largest_norm,
+        )
     }
 
-    /// [`Self::support`] of the space divided by [`Self::largest_norm`].
+    /// How many axes count.
+    pub(crate) fn n_axes(&self) -> usize {
+        self.coordinates.n_axes()
+    }
+
+    pub(crate) fn coordinates(&self) -> &Coordinates {
+        &self.coordinates
+    }
+
+    /// [`Self::support`] in coordinates divided by [`Self::largest_norm`].
     pub(crate) fn scaled_support(&self, direction: &[f64; 6]) -> (f64, [f64; 6]) {
         match self.norm {
             Norm::L1 => {
-                let (value, idx) = self.best(direction, 0..self.wrenches.len());
-                (value, self.scaled_wrench(idx))
+                let mut best = best_in(&self.blocks, direction);
+                for ball in &self.balls {
+                    let (value, point) = ball.support(direction);
+                    if value > best.0 {
+                        best = (value, point);
+                    }
+                }
+                best
             }
             Norm::LInf => {
                 let mut sum = [0.0; 6];
-                for range in &self.of_contact {
-                    let (value, idx) = self.best(direction, range.clone());
+                for part in &self.parts {
+                    let (value, point) = match part {
+                        Part::Blocks(range) => best_in(&self.blocks[range.clone()], direction),
+                        Part::Ball(idx) => self.balls[*idx].support(direction),
+                    };
                     if value > 0.0 {
-                        let wrench = self.scaled_wrench(idx);
                         for k in 0..6 {
-                            sum[k] += wrench[k];
+                            sum[k] += point[k];
                         }
                     }
                 }
@@ -112,37 +271,72 @@ impl GraspWrenchSpace {
     pub(crate) fn scaled_size(&self) -> f64 {
         match self.norm {
             Norm::L1 => 1.0,
-            Norm::LInf => self.of_contact.len() as f64,
+            Norm::LInf => self.parts.len() as f64,
         }
+    }
+
+    /// Sum of the scaled wrenches.
+    pub(crate) fn scaled_sum(&self) -> &[f64; 6] {
+        &self.sum
     }
 
     /// Force and torque sizes that the rank is judged by.
     pub(crate) fn block_sizes(&self) -> (f64, f64) {
         (self.largest_force, self.torque_bound)
     }
+}
 
-    fn scaled_wrench(&self, idx: usize) -> [f64; 6] {
-        std::array::from_fn(|k| self.scaled[k][idx])
-    }
-
-    /// The largest dot product in a range, and the first wrench that has it.
-    fn best(&self, d: &[f64; 6], range: Range<usize>) -> (f64, usize) {
-        let first = range.start;
-        let [a, b, c, e, f, g] = std::array::from_fn(|k| &self.scaled[k][range.clone()]);
-        let mut best = (f64::NEG_INFINITY, first);
-        let dots = a.iter().zip(b).zip(c).zip(e).zip(f).zip(g);
-        for (i, (((((a, b), c), e), f), g)) in dots.enumerate() {
-            let value = (d[0] * a + d[1] * b + d[2] * c) + (d[3] * e + d[4] * f + d[5] * g);
-            if value > best.0 {
-                best = (value, first + i);
+impl Ball {
+    fn support(&self, direction: &[f64; 6]) -> (f64, [f64; 6]) {
+        let along = self.axes.map(|a| dot(&a, direction));
+        let length = dot(&along, &along).sqrt();
+        let mut point = self.center;
+        if length > 0.0 {
+            for (axis, along) in self.axes.iter().zip(along) {
+                for k in 0..6 {
+                    point[k] += axis[k] * (along / length);
+                }
             }
         }
-        best
+        (dot(direction, &point), point)
     }
 }
 
-pub(crate) fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
+/// The largest dot product in the blocks, and the first wrench that has it.
+fn best_in(blocks: &[Block], d: &[f64; 6]) -> (f64, [f64; 6]) {
+    let mut best = (f64::NEG_INFINITY, 0);
+    for (idx, block) in blocks.iter().enumerate() {
+        let values = block.dots(d);
+        let mut most = values;
+        for half in [LANES / 2, LANES / 4, LANES / 8] {
+            for lane in 0..half {
+                most[lane] = if most[lane + half] > most[lane] {
+                    most[lane + half]
+                } else {
+                    most[lane]
+                };
+            }
+        }
+        if most[0] > best.0 {
+            best = (most[0], idx);
+        }
+    }
+    let Some(block) = blocks.get(best.1) else {
+        return (f64::NEG_INFINITY, [0.0; 6]);
+    };
+    let lane = block.dots(d).iter().position(|&v| v == best.0).unwrap_or(0);
+    (best.0, std::array::from_fn(|k| block.0[k][lane]))
+}
+
+impl Block {
+    fn dots(&self, d: &[f64; 6]) -> [f64; LANES] {
+        let mut sums = [0.0; LANES];
+        for lane in 0..LANES {
+            let [a, b, c, e, f, g] = std::array::from_fn(|k| d[k] * self.0[k][lane]);
+            sums[lane] = (a + c + f) + (b + e + g);
+        }
+        sums
+    }
 }
 
 #[cfg(test)]
@@ -162,6 +356,28 @@ mod tests {
         let z = Wrench::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
         assert_eq!(space.support(&z), (2.0, 2.0 * z));
         assert_eq!(space.support(&-z), (1.0, -z));
+    }
+
+    #[test]
+    fn a_smooth_cone_reaches_as_far_as_any_number_of_edges() {
+        let point = Point3::new(0.03, -0.02, 0.05);
+        let contact = Contact::new(0, point, Vector3::new(1.0, 2.0, -0.5), 0.7, 0.0).unwrap();
+        let space = |cone| {
+            let options = QualityOptions {
+                cone,
+                gravity: Vector3::new(0.0, 0.1, 0.5),
+                ..QualityOptions::new(Point3::origin(), 0.1)
+            };
+            GraspWrenchSpace::new(&[contact], &options).unwrap()
+        };
+        let (smooth, edged) = (space(ConeShape::Smooth), space(ConeShape::Edges(1024)));
+        assert!(edged.is_polyhedral() && !smooth.is_polyhedral());
+        for k in 0..50 {
+            let d = Wrench::from_fn(|i, _| (1.7 * f64::from(k) + 2.3 * i as f64).sin());
+            let (round, straight) = (smooth.support(&d).0, edged.support(&d).0);
+            // An edge every 2π/1024: short of the circle by at most μ |d| |arm| (1 − cos(π/1024)).
+            assert!(round >= straight - 1e-12 && round - straight < 3e-5);
+        }
     }
 
     #[test]

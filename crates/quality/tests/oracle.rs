@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use prehend_quality::{
-    Contact, EpsilonSolver, LengthUnit, Norm, QualityOptions, grasp_quality, grasp_quality_with,
+    ConeShape, Contact, EpsilonSolver, LengthUnit, Norm, QualityOptions, grasp_quality, grasp_quality_with,
 };
 use serde::Deserialize;
 
@@ -41,7 +41,7 @@ impl Case {
             Contact::new(i, c.point.into(), c.normal.into(), c.mu, c.torsion).unwrap()
         };
         let options = QualityOptions {
-            cone_edges: self.cone_edges,
+            cone: ConeShape::Edges(self.cone_edges),
             norm: self.norm,
             length_unit: self.length_unit,
             volume: true,

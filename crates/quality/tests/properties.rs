@@ -1,7 +1,9 @@
 //! Laws that every grasp's quality obeys.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use prehend_quality::{Contact, GraspWrenchSpace, Norm, QualityError, QualityOptions, Wrench, grasp_quality};
+use prehend_quality::{
+    ConeShape, Contact, GraspWrenchSpace, Norm, QualityError, QualityOptions, Wrench, grasp_quality,
+};
 use proptest::prelude::*;
 
 fn direction() -> impl Strategy<Value = Vector3<f64>> {
@@ -66,7 +68,7 @@ proptest! {
     fn a_rigid_motion_matters_only_through_the_edges(contacts in grasp(6), axis in direction(), angle in 0.0..3.0_f64) {
         // Point contacts with 64 edges: the cone that the edges span lies between one of aperture cos(π/64) μ and one of μ.
         let hard: Vec<Contact> = contacts.iter().map(|c| Contact { torsion: 0.0, ..*c }).collect();
-        let options = QualityOptions { cone_edges: 64, ..options() };
+        let options = QualityOptions { cone: ConeShape::Edges(64), ..options() };
         let motion = Isometry3::from_parts(
             Translation3::new(0.3, -0.2, 0.1),
             UnitQuaternion::from_scaled_axis(angle * axis),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use prehend::geometry::ContactPoint;
-use prehend::quality::{Contact, LengthUnit, Norm, QualityOptions, grasp_quality};
+use prehend::quality::{ConeShape, Contact, LengthUnit, Norm, QualityOptions, grasp_quality};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -110,9 +110,7 @@ fn quality(value: Value, volume: bool) -> Result<Value> {
         .map(contact)
         .collect::<Result<Vec<_>>>()?;
     let options = QualityOptions {
-        center: Point3::from(line.center),
-        torque_scale: line.torque_scale,
-        cone_edges: line.cone_edges,
+        cone: ConeShape::Edges(line.cone_edges),
         norm: match line.norm {
             NormName::L1 => Norm::L1,
             NormName::Linf => Norm::LInf,
@@ -122,6 +120,7 @@ fn quality(value: Value, volume: bool) -> Result<Value> {
             UnitName::Millimetre => LengthUnit::Millimetre,
         },
         volume,
+        ..QualityOptions::new(Point3::from(line.center), line.torque_scale)
     };
     let quality = grasp_quality(&contacts, &options)?;
     let mut answer = json!({
