@@ -38,6 +38,7 @@
 
 mod between_solids;
 mod box_record;
+mod clip;
 mod closest;
 mod collider;
 mod contact_point;

@@ -123,6 +123,26 @@ proptest! {
     }
 
     #[test]
+    fn the_union_of_two_boxes_is_their_sum_less_what_they_share(
+        t in tetrahedron(), turn in rotation(),
+        (low, middle, high) in ([0.0..0.5, 0.0..0.5, 0.0..0.5], [0.5..0.7, 0.5..0.7, 0.5..0.7], [0.7..1.2, 0.7..1.2, 0.7..1.2]),
+    ) {
+        // Two boxes with the same axes share a box: from `middle` to `high` and from `low` to a little beyond `middle`.
+        let spanned = |low: Vector3<f64>, high: Vector3<f64>| {
+            let rotation = turn.to_rotation_matrix();
+            OrientedBox::new((rotation * ((low + high) / 2.0)).into(), rotation, high - low).unwrap()
+        };
+        let (low, middle, high) = (Vector3::from(low), Vector3::from(middle), Vector3::from(high));
+        let beyond = middle + Vector3::repeat(0.1);
+        let (first, second) = (spanned(low, beyond), spanned(middle, high.sup(&(beyond + Vector3::repeat(0.1)))));
+        let shared = spanned(middle, beyond);
+        let expected = t.intersection_volume(&first) + t.intersection_volume(&second) - t.intersection_volume(&shared);
+        prop_assert!((t.union_volume(&[first, second]) - expected).abs() < 1e-14);
+        let expected = first.volume() + second.volume() - shared.volume();
+        prop_assert!((union_volume(&[first, second]) - expected).abs() < 1e-14);
+    }
+
+    #[test]
     fn no_three_contacts_span_more_than_the_largest_tetrahedron(
         apex in vector(1.0), contacts in proptest::collection::vec(vector(1.0), 3..7),
     ) {

@@ -7,6 +7,7 @@ faces. Unions follow by inclusion and exclusion. Nothing is split into tetrahedr
 Run with Python 3.11 (standard library only): python3 shared_volumes.py > shared_volumes.json
 """
 
+import copy
 import itertools
 import json
 import random
@@ -186,8 +187,98 @@ def cases():
     yield "a turned box twice", random_tetrahedron(rng), [turned, turned]
     halves = [dict(unit, center=[x, 0.5, 0.5], extents=[0.5, 1.0, 1.0]) for x in (0.25, 0.75)]
     yield "a cut box", random_tetrahedron(rng), halves
+    yield from far_and_small(rng)
+    yield from needles_and_plates(rng)
+    yield from touching(unit, corner)
     nested = dict(unit, extents=[0.25, 0.5, 0.5])
     yield "a box in a box", [[-1.0, -1.0, -1.0], [3.0, 0.0, 0.1], [0.2, 3.0, 0.0], [0.0, 0.3, 3.0]], [nested, unit]
+
+
+def scaled(case, factor):
+    case["tetrahedron"] = [[x * factor for x in p] for p in case["tetrahedron"]]
+    for box in case["boxes"]:
+        box["center"] = [x * factor for x in box["center"]]
+        box["extents"] = [x * factor for x in box["extents"]]
+    return case
+
+
+def far_and_small(rng):
+    """Ordinary bodies at any place and scale."""
+    for power in (3, 4, 5, 6):
+        for k in range(3):
+            offset = [rng.uniform(-1, 1) * 10**power for _ in range(3)]
+            boxes = [random_box(rng, [rng.uniform(0.3, 1.5) for _ in range(3)]) for _ in range(2)]
+            case = moved({"tetrahedron": random_tetrahedron(rng), "boxes": boxes}, offset)
+            yield f"1e{power} units away {k}", case["tetrahedron"], case["boxes"]
+    for power in (-6, -3, 3, 6):
+        for k in range(3):
+            boxes = [random_box(rng, [rng.uniform(0.3, 1.5) for _ in range(3)]) for _ in range(2)]
+            case = scaled({"tetrahedron": random_tetrahedron(rng), "boxes": boxes}, 10.0**power)
+            yield f"scaled by 1e{power} {k}", case["tetrahedron"], case["boxes"]
+            case = moved(copy.deepcopy(case), [rng.uniform(-1, 1) * 1e3 * 10.0**power for _ in range(3)])
+            yield f"scaled by 1e{power}, a thousand sizes away {k}", case["tetrahedron"], case["boxes"]
+
+
+def needles_and_plates(rng):
+    """Needles and plates, up to a millionth as thick as long."""
+    for power in (2, 3, 4, 5, 6):
+        width = 10.0**-power
+        for k in range(3):
+            base, along = [[rng.uniform(-0.5, 0.5) for _ in range(3)] for _ in range(2)]
+            needle = [base] + [
+                [b + t * a + rng.gauss(0, width) for b, a in zip(base, along)] for t in (0.5, 1.0, 1.5)
+            ]
+            yield f"needle 1e-{power} {k}", needle, [random_box(rng, [0.4, 0.5, 0.6])]
+            across = [rng.uniform(-0.5, 0.5) for _ in range(3)]
+            plate = [
+                [b + u * a + v * c + rng.gauss(0, width) for b, a, c in zip(base, along, across)]
+                for u, v in ((0, 0), (1, 0.2), (0.1, 1), (1.2, 1.1))
+            ]
+            yield f"plate 1e-{power} {k}", plate, [random_box(rng, [0.4, 0.5, 0.6])]
+            yield f"sheet 1e-{power} {k}", random_tetrahedron(rng), [random_box(rng, [1.0, 0.9, width])]
+            yield f"stick 1e-{power} {k}", random_tetrahedron(rng), [random_box(rng, [1.0, width, width], 0.1)]
+            yield f"plate 1e-{power} in a sheet {k}", plate, [random_box(rng, [1.0, 0.9, width], 0.1)]
+            far = [rng.uniform(-1, 1) * 1e3 for _ in range(3)]
+            case = moved({"tetrahedron": needle, "boxes": [random_box(rng, [0.4, 0.5, 0.6])]}, far)
+            yield f"needle 1e-{power}, a thousand units away {k}", case["tetrahedron"], case["boxes"]
+
+
+def touching(unit, corner):
+    """Bodies whose faces, edges or corners meet, and one inside the other."""
+
+    def shifted(dx, dy, dz, factor=1.0):
+        return [[factor * x + d for x, d in zip(p, (dx, dy, dz))] for p in corner]
+
+    yield "inside, apart", shifted(0.25, 0.25, 0.25, 0.25), [unit]
+    yield "inside, on three faces", shifted(0, 0, 0, 0.5), [unit]
+    yield "inside, on one face", shifted(0.25, 0.25, 0, 0.5), [unit]
+    yield "around, apart", shifted(-1, -1, -1, 8.0), [unit]
+    yield "around, on three faces", shifted(0, 0, 0, 3.0), [unit]
+    yield "around, a corner on the slope", shifted(0, 0, 0, 3.0), [dict(unit, center=[0.75] * 3, extents=[0.5] * 3)]
+    yield "outside, on a face", shifted(0.25, 0.25, 1.0, 0.5), [unit]
+    yield "outside, on an edge", shifted(1.0, 1.0, 0.0), [unit]
+    yield "outside, on a corner", shifted(1.0, 1.0, 1.0), [unit]
+    yield "a corner on a face, from outside", [[0.5, 0.5, 1.0], [0.2, 0.1, 2.0], [0.9, 0.3, 2.0], [0.5, 0.9, 2.5]], [unit]
+    yield "a corner on a face, from inside", [[0.5, 0.5, 1.0], [0.2, 0.1, 0.2], [0.9, 0.3, 0.1], [0.5, 0.9, 0.3]], [unit]
+    yield "a corner on a face, through", [[0.5, 0.5, 0.0], [0.2, 0.1, 2.0], [0.9, 0.3, 2.0], [0.5, 0.9, 2.5]], [unit]
+    yield "a corner on an edge", [[0.0, 0.5, 0.0], [1.5, 0.1, 0.2], [0.9, 1.3, 0.1], [0.5, 0.4, 1.3]], [unit]
+    yield "an edge along an edge", [[0.0, 0.0, 0.25], [0.0, 0.0, 0.75], [1.5, 0.0, 0.5], [0.0, 1.5, 0.5]], [unit]
+    yield "a face in the ceiling, from below", [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 2.0, 1.0], [0.3, 0.3, -0.5]], [unit]
+    yield "a face in the ceiling, from above", [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 2.0, 1.0], [0.3, 0.3, 2.5]], [unit]
+    yield "corners of the cube", [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]], [unit]
+
+
+def length(v):
+    return float(dot(v, v)) ** 0.5
+
+
+def slenderness(tetrahedron, boxes):
+    """The larger of longest edge over least height, and longest over shortest extent of a box."""
+    points = [exact(p) for p in tetrahedron]
+    edges = [length(sub(p, q)) for p, q in itertools.combinations(points, 2)]
+    areas = [length(cross(sub(q, p), sub(r, p))) for p, q, r in itertools.combinations(points, 3)]
+    height = float(abs(det(*[sub(p, points[0]) for p in points[1:]]))) / max(areas)
+    return max([max(edges) / height] + [max(b["extents"]) / min(b["extents"]) for b in boxes])
 
 
 def main():
@@ -200,12 +291,13 @@ def main():
                 "name": name,
                 "tetrahedron": tetrahedron,
                 "boxes": boxes,
+                "slenderness": slenderness(tetrahedron, boxes),
                 "shared": [float(volume(around + body)) for body in bodies],
                 "union": float(union(bodies, around)),
                 "union_of_boxes": float(union(bodies, [])),
             }
         )
-    print(json.dumps(out, indent=1))
+    print("[" + ",\n".join(json.dumps(case) for case in out) + "]")
 
 
 if __name__ == "__main__":
