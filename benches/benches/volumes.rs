@@ -29,12 +29,19 @@ fn grasps() -> Vec<Grasped> {
         ..SynthesisOptions::default()
     };
     let mut all = Vec::new();
-    for object in ["mug/coffee_mug", "hammer/claw_hammer", "bottle/handled_jug", "glass/wine_glass"] {
+    for object in [
+        "mug/coffee_mug",
+        "hammer/claw_hammer",
+        "bottle/handled_jug",
+        "glass/wine_glass",
+    ] {
         let path = root.join("objects").join(object).with_extension("ply");
         let shape = shape_of(&path, ObjectOptions::default()).expect("the bundled objects are there");
         let object = shape.grasp_object().expect("they can be grasped");
         for name in ["human", "schunk_sdh"] {
-            let hand = HandData::read(&root.join("hands").join(name)).expect("the bundled hands are there").hand;
+            let hand = HandData::read(&root.join("hands").join(name))
+                .expect("the bundled hands are there")
+                .hand;
             let found = synthesize(&hand, &object, &options, &|_| true).expect("the hand fits");
             for grasp in found.grasps {
                 let palm = grasp.object_from_root * hand.root_from_palm(&grasp.joints);
@@ -55,8 +62,10 @@ fn grasps() -> Vec<Grasped> {
 
 fn volumes(c: &mut Criterion) {
     let grasps = grasps();
-    let pairs: Vec<(Tetrahedron, OrientedBox)> =
-        grasps.iter().flat_map(|g| g.boxes.iter().map(|b| (g.enclosure, *b))).collect();
+    let pairs: Vec<(Tetrahedron, OrientedBox)> = grasps
+        .iter()
+        .flat_map(|g| g.boxes.iter().map(|b| (g.enclosure, *b)))
+        .collect();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let unit = OrientedBox::centered([1.0; 3]);
     let random: Vec<(Tetrahedron, OrientedBox)> = (0..2000)
@@ -82,7 +91,9 @@ fn volumes(c: &mut Criterion) {
             black_box(&grasp.enclosure).union_volume(black_box(&grasp.boxes))
         });
     });
-    c.bench_function("union_volume/boxes", |b| b.iter(|| union_volume(black_box(&grasps[0].boxes))));
+    c.bench_function("union_volume/boxes", |b| {
+        b.iter(|| union_volume(black_box(&grasps[0].boxes)))
+    });
     c.bench_function("largest_tetrahedron/grasps", |b| {
         let mut next = grasps.iter().cycle();
         b.iter(|| {
