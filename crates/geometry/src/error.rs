@@ -17,6 +17,15 @@ pub enum GeometryError {
         expected: String,
     },
 
+    /// The format is read by a feature of the crate that is off.
+    #[error(
+        "this format is read by the feature `{feature}` of prehend-geometry, which this build leaves out"
+    )]
+    NotBuilt {
+        /// Name of the feature.
+        feature: &'static str,
+    },
+
     /// A triangle names a vertex that does not exist.
     #[error("triangle {triangle} names vertex {vertex}, but there are only {n_vertices} vertices")]
     VertexOutOfRange {

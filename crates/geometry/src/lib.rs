@@ -1,6 +1,7 @@
 //! Where do shapes meet, and how much do they share?
 //!
-//! Shapes come in as bytes ([`read_shape`]: OFF, OBJ, STL, PLY, and clouds as PLY, XYZ, PCD), are looked over
+//! Shapes come in as bytes ([`read_shape`]: OFF, OBJ, STL, PLY, clouds as PLY, XYZ, PCD, and with the features `gltf` and
+//! `dae` glTF, GLB and COLLADA; [`read_shape_with`] where they name further files), are looked over
 //! ([`inspect`]) and mended where that needs no guess ([`repair`]), and then answer questions:
 //!
 //! - *How much is there?* [`mass_properties`], [`surface_area`], [`surface_centroid`].
@@ -83,7 +84,7 @@ pub use mesh::TriMesh;
 pub use min_box::{MinimumBox, minimum_volume_box};
 pub use oriented_box::OrientedBox;
 pub use planar::planar_hull;
-pub use read::{MeshFormat, Shape, read_mesh, read_shape};
+pub use read::{FileShape, MeshFormat, Resolve, Shape, Stated, read_mesh, read_shape, read_shape_with};
 pub use repair::{Repairs, repair};
 pub use shared_volume::union_volume;
 pub use solid::{PlacedSolid, Solid};

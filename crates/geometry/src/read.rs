@@ -5,6 +5,12 @@
 //! expected. They also change nothing: vertices come in the file's order and number, degenerate triangles stay.
 //! [`crate::repair`] is the place for that.
 
+#[cfg(any(feature = "gltf", feature = "dae"))]
+mod assembly;
+#[cfg(feature = "dae")]
+mod dae;
+#[cfg(feature = "gltf")]
+mod gltf;
 mod lzf;
 mod obj;
 mod off;
@@ -15,7 +21,9 @@ mod stl;
 mod text;
 mod xyz;
 
-use nalgebra::Point3;
+#[cfg(feature = "gltf")]
+use nalgebra::Vector3;
+use nalgebra::{Point3, UnitVector3};
 
 use crate::{GeometryError, TriMesh};
 
@@ -34,6 +42,12 @@ pub enum MeshFormat {
     Xyz,
     /// Point Cloud Data, ASCII, binary or compressed.
     Pcd,
+    /// glTF 2.0 as JSON; its buffers may be further files. Read with the feature `gltf`.
+    Gltf,
+    /// glTF 2.0 as one binary file. Read with the feature `gltf`.
+    Glb,
+    /// COLLADA. Read with the feature `dae`.
+    Dae,
 }
 
 impl MeshFormat {
@@ -47,12 +61,15 @@ impl MeshFormat {
             "ply" => Some(Self::Ply),
             "xyz" => Some(Self::Xyz),
             "pcd" => Some(Self::Pcd),
+            "gltf" => Some(Self::Gltf),
+            "glb" => Some(Self::Glb),
+            "dae" => Some(Self::Dae),
             _ => None,
         }
     }
 
     /// All extensions that [`from_extension`](Self::from_extension) knows, in lower case.
-    pub const EXTENSIONS: [&str; 6] = ["off", "obj", "stl", "ply", "xyz", "pcd"];
+    pub const EXTENSIONS: [&str; 9] = ["off", "obj", "stl", "ply", "xyz", "pcd", "gltf", "glb", "dae"];
 }
 
 /// What a file held.
@@ -74,12 +91,101 @@ impl Shape {
     }
 }
 
-/// Reads a shape. Coordinates stay in the file's own unit and axes.
+/// Takes the name of a further file, as a file gives it, to its bytes, or says why it cannot (`is missing`).
+pub type Resolve<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
+
+/// A shape, and what its file says of its coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileShape {
+    /// The shape, in the file's own unit and axes.
+    pub shape: Shape,
+    /// Unit and upward axis, where the file or its format states them.
+    pub stated: Stated,
+}
+
+/// What a file or its format says of its coordinates. Of the formats here, glTF always does, DAE mostly, others never.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Stated {
+    /// Metres per unit.
+    pub metres_per_unit: Option<f64>,
+    /// The direction that is up.
+    pub up: Option<UnitVector3<f64>>,
+}
+
+/// Reads a shape that may name further files, with the unit and upward axis that it states.
+///
+/// # Errors
+///
+/// Those of [`read_shape`], also where a further file cannot be had.
+///
+/// # Examples
+///
+/// A triangle whose positions stand in a second file:
+///
+/// ```
+/// # #[cfg(feature = "gltf")] {
+/// use prehend_geometry::{MeshFormat, read_shape_with};
+///
+/// let text = r#"{ "asset": {"version": "2.0"},
+///     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+///     "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+///     "bufferViews": [{"buffer": 0, "byteLength": 36}],
+///     "buffers": [{"uri": "corners.bin", "byteLength": 36}] }"#;
+/// let corners: Vec<u8> = [0_f32, 0., 0., 1., 0., 0., 0., 1., 0.].map(f32::to_le_bytes).concat();
+/// let resolve = |name: &str| match name {
+///     "corners.bin" => Ok(corners.clone()),
+///     _ => Err("is missing".to_owned()),
+/// };
+/// let read = read_shape_with(text.as_bytes(), MeshFormat::Gltf, &resolve)?;
+/// assert_eq!(read.shape.points().len(), 3);
+/// assert_eq!(read.stated.metres_per_unit, Some(1.0));
+/// # }
+/// # Ok::<(), prehend_geometry::GeometryError>(())
+/// ```
+#[cfg_attr(
+    not(feature = "gltf"),
+    expect(unused_variables, reason = "only glTF has further files")
+)]
+pub fn read_shape_with(
+    bytes: &[u8],
+    format: MeshFormat,
+    resolve: &Resolve,
+) -> Result<FileShape, GeometryError> {
+    let (shape, stated) = match format {
+        MeshFormat::Off => (off::read(bytes).map(Shape::Mesh)?, Stated::default()),
+        MeshFormat::Obj => (obj::read(bytes).map(Shape::Mesh)?, Stated::default()),
+        MeshFormat::Stl => (stl::read(bytes).map(Shape::Mesh)?, Stated::default()),
+        MeshFormat::Ply => (ply::read(bytes)?, Stated::default()),
+        MeshFormat::Xyz => (xyz::read(bytes).map(Shape::Cloud)?, Stated::default()),
+        MeshFormat::Pcd => (pcd::read(bytes).map(Shape::Cloud)?, Stated::default()),
+        #[cfg(feature = "gltf")]
+        MeshFormat::Gltf | MeshFormat::Glb => {
+            let stated = Stated {
+                metres_per_unit: Some(1.0),
+                up: Some(Vector3::y_axis()),
+            };
+            (gltf::read(bytes, resolve).map(Shape::Mesh)?, stated)
+        }
+        #[cfg(not(feature = "gltf"))]
+        MeshFormat::Gltf | MeshFormat::Glb => return Err(GeometryError::NotBuilt { feature: "gltf" }),
+        #[cfg(feature = "dae")]
+        MeshFormat::Dae => {
+            let (mesh, stated) = dae::read(bytes)?;
+            (Shape::Mesh(mesh), stated)
+        }
+        #[cfg(not(feature = "dae"))]
+        MeshFormat::Dae => return Err(GeometryError::NotBuilt { feature: "dae" }),
+    };
+    Ok(FileShape { shape, stated })
+}
+
+/// Reads a shape from one file. Coordinates stay in the file's own unit and axes.
 ///
 /// # Errors
 ///
 /// [`GeometryError::Parse`] where the bytes are not of the format or a coordinate is not finite;
-/// [`GeometryError::Empty`] where there are no triangles (meshes) or no points (clouds).
+/// [`GeometryError::Empty`] where there are no triangles (meshes) or no points (clouds);
+/// [`GeometryError::NotBuilt`] where the format's feature is off.
 ///
 /// # Examples
 ///
@@ -96,14 +202,8 @@ impl Shape {
 /// # Ok::<(), prehend_geometry::GeometryError>(())
 /// ```
 pub fn read_shape(bytes: &[u8], format: MeshFormat) -> Result<Shape, GeometryError> {
-    match format {
-        MeshFormat::Off => off::read(bytes).map(Shape::Mesh),
-        MeshFormat::Obj => obj::read(bytes).map(Shape::Mesh),
-        MeshFormat::Stl => stl::read(bytes).map(Shape::Mesh),
-        MeshFormat::Ply => ply::read(bytes),
-        MeshFormat::Xyz => xyz::read(bytes).map(Shape::Cloud),
-        MeshFormat::Pcd => pcd::read(bytes).map(Shape::Cloud),
-    }
+    let alone = |_: &str| Err("is not at hand".to_owned());
+    read_shape_with(bytes, format, &alone).map(|read| read.shape)
 }
 
 /// Reads a mesh; a cloud is an error.
@@ -137,7 +237,7 @@ mod tests {
             assert!(MeshFormat::from_extension(extension).is_some());
         }
         assert_eq!(MeshFormat::from_extension(".STL"), Some(MeshFormat::Stl));
-        assert_eq!(MeshFormat::from_extension("dae"), None);
+        assert_eq!(MeshFormat::from_extension("fbx"), None);
     }
 
     #[test]

@@ -60,6 +60,21 @@ fn files() -> Vec<(MeshFormat, Vec<u8>)> {
             format!("{head}DATA ascii\n1 2 3 4\n5 6 7 8\n").into_bytes(),
         ),
         (MeshFormat::Pcd, pcd),
+        #[cfg(feature = "gltf")]
+        (
+            MeshFormat::Gltf,
+            include_bytes!("corpus/gltf/two_nodes.gltf").to_vec(),
+        ),
+        #[cfg(feature = "gltf")]
+        (
+            MeshFormat::Glb,
+            include_bytes!("corpus/glb/tetrahedron.glb").to_vec(),
+        ),
+        #[cfg(feature = "dae")]
+        (
+            MeshFormat::Dae,
+            include_bytes!("corpus/dae/mirrored_node.dae").to_vec(),
+        ),
     ]
 }
 
@@ -113,7 +128,7 @@ proptest! {
 
     #[test]
     fn no_bytes_at_all_make_a_reader_panic(
-        bytes in proptest::collection::vec(any::<u8>(), 0..200), which in 0..6_usize,
+        bytes in proptest::collection::vec(any::<u8>(), 0..200), which in 0..MeshFormat::EXTENSIONS.len(),
     ) {
         check(&bytes, MeshFormat::from_extension(MeshFormat::EXTENSIONS[which]).unwrap());
     }

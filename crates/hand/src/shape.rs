@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_geometry::{
-    GeometryError, MeshFormat, PlacedSolid, Solid, TriMesh, convex_hull, inspect, read_mesh, repair,
-    signed_volume,
+    GeometryError, MeshFormat, PlacedSolid, Shape, Solid, TriMesh, convex_hull, inspect, read_shape_with,
+    repair, signed_volume,
 };
 use urdf_rs::Geometry;
 
@@ -136,17 +136,28 @@ impl<'a> ShapeReader<'a> {
         let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
         let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
         let Some(format) = MeshFormat::from_extension(extension) else {
-            let found =
-                format!("`.{extension}` is not a format that is read; convert it to STL, OBJ, PLY or OFF");
-            return Err(unreadable(found));
+            let known = MeshFormat::EXTENSIONS.join(", ");
+            return Err(unreadable(format!(
+                "`.{extension}` is not a format that is read; use one of {known}"
+            )));
         };
         let bytes = (self.resolve)(file).map_err(|reason| HandError::MeshMissing {
             link: link.to_owned(),
             file: file.to_owned(),
             reason,
         })?;
-        let mesh = read_mesh(&bytes, format).map_err(|error| unreadable(error.to_string()))?;
-        scaled(&mesh, scale).map_err(|error| unreadable(error.to_string()))
+        // Further files (a glTF's buffers) stand beside the mesh.
+        let folder = &file[..file.len() - name.len()];
+        let beside = |further: &str| {
+            (self.resolve)(&format!("{folder}{further}")).map_err(|reason| format!("cannot be had: {reason}"))
+        };
+        let read = read_shape_with(&bytes, format, &beside).map_err(|error| unreadable(error.to_string()))?;
+        let Shape::Mesh(mesh) = read.shape else {
+            return Err(unreadable("it is a cloud of points without triangles".to_owned()));
+        };
+        // As ROS does: a COLLADA file's unit counts, its upward axis does not.
+        let scale = scale * read.stated.metres_per_unit.unwrap_or(1.0);
+        scaled(&mesh, &scale).map_err(|error| unreadable(error.to_string()))
     }
 }
 
@@ -311,6 +322,44 @@ mod tests {
     }
 
     const TETRAHEDRON: &str = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+
+    #[test]
+    fn a_collada_unit_counts_its_upward_axis_does_not_and_buffers_stand_beside() {
+        let link = "<collision><geometry><mesh filename=\"package://r/meshes/tip.EXT\" scale=\"2 2 2\"/></geometry></collision>";
+        let urdf = |extension| {
+            format!(
+                "<robot name=\"r\"><link name=\"l\">{}</link></robot>",
+                link.replace("EXT", extension)
+            )
+        };
+        let collada = r##"<COLLADA><asset><unit meter="0.01"/><up_axis>Y_UP</up_axis></asset>
+            <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
+            <technique_common><accessor source="#a" count="4" stride="3"/></technique_common></source>
+            <triangles><input semantic="POSITION" source="#p"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry>
+            </library_geometries></COLLADA>"##;
+        let gltf = r#"{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "tip.bin", "byteLength": 36}]}"#;
+        let buffer: Vec<u8> = [0_f32, 0., 0., 0., 0., 0.01, 0., 0.01, 0.]
+            .map(f32::to_le_bytes)
+            .concat();
+        let resolve = |name: &str| match name {
+            "package://r/meshes/tip.dae" => Ok(collada.as_bytes().to_vec()),
+            "package://r/meshes/tip.gltf" => Ok(gltf.as_bytes().to_vec()),
+            "package://r/meshes/tip.bin" => Ok(buffer.clone()),
+            _ => Err(format!("{name} is missing")),
+        };
+        for extension in ["dae", "gltf"] {
+            let hand = Hand::from_urdf(&urdf(extension), &resolve).unwrap();
+            let points = match &hand.links()[0].collision[0].solid {
+                Solid::Hull(points) => points.to_vec(),
+                Solid::Mesh(mesh) => mesh.vertices().to_vec(),
+                other => panic!("{other:?}"),
+            };
+            let highest = points.iter().map(|p| p.z).fold(0.0, f64::max);
+            assert!((highest - 0.02).abs() < 1e-9, "{extension}: {highest}");
+        }
+    }
 
     #[test]
     fn a_convex_mesh_becomes_its_hull_and_a_mirrored_one_too() {

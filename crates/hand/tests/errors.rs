@@ -321,9 +321,9 @@ fn shapes_need_a_size_and_a_file() {
     );
     assert_changed_says(
         "package://gripper/tip.stl",
-        "tip.dae",
-        "link `tip`: mesh `tip.dae` cannot be read: `.dae` is not a format that is read; convert it to STL, OBJ, PLY \
-         or OFF",
+        "tip.fbx",
+        "link `tip`: mesh `tip.fbx` cannot be read: `.fbx` is not a format that is read; use one of off, obj, stl, \
+         ply, xyz, pcd, gltf, glb, dae",
     );
     let broken = read(&urdf_with("package://gripper/tip.stl", "broken.stl"))
         .unwrap_err()
@@ -343,13 +343,13 @@ fn shapes_need_a_size_and_a_file() {
 #[test]
 fn a_picture_that_cannot_be_read_is_left_out_with_a_warning() {
     let visual =
-        r#"<link name="other"><visual><geometry><mesh filename="other.dae"/></geometry></visual></link>"#;
+        r#"<link name="other"><visual><geometry><mesh filename="other.fbx"/></geometry></visual></link>"#;
     let hand = read(&urdf_with(r#"<link name="other"/>"#, visual)).unwrap();
     assert_eq!(
         hand.warnings(),
         [
-            "not drawn: link `other`: mesh `other.dae` cannot be read: `.dae` is not a format that is read; convert it \
-          to STL, OBJ, PLY or OFF"
+            "not drawn: link `other`: mesh `other.fbx` cannot be read: `.fbx` is not a format that is read; use one of \
+          off, obj, stl, ply, xyz, pcd, gltf, glb, dae"
         ]
     );
 }

@@ -124,6 +124,12 @@ fn layout(
         let count = counts.get(field).copied().unwrap_or(1);
         let total = size.checked_mul(count);
         if let Some(axis) = ["x", "y", "z"].iter().position(|axis| name == axis) {
+            if count == 0 {
+                return Err(place.error(
+                    &format!("{name}, counted 0 times"),
+                    "x, y and z, each counted once",
+                ));
+            }
             coordinates[axis] = Some(Coordinate {
                 column,
                 offset,
@@ -396,6 +402,11 @@ mod tests {
         assert_eq!(
             message(format!("{HEAD}DATA zipped\n").as_bytes()),
             "PCD, line 11: found `DATA zipped`, expected DATA ascii, binary or binary_compressed"
+        );
+        let none = HEAD.replace("COUNT 2 1 1 1", "COUNT 2 1 0 1") + "DATA binary\n";
+        assert_eq!(
+            message(none.as_bytes()),
+            "PCD, line 11: found `y, counted 0 times`, expected x, y and z, each counted once"
         );
         assert_eq!(
             message(b"FIELDS x y z\n"),

@@ -38,8 +38,23 @@ impl Faces {
             .extend(edges.map(|edge| [polygon[0], edge[0], edge[1]]));
     }
 
+    #[cfg(any(feature = "gltf", feature = "dae"))]
     pub fn push_triangle(&mut self, triangle: [u32; 3]) {
         self.triangles.push(triangle);
+    }
+
+    /// Adds a strip: every corner from the third on makes a triangle with the two before, every second one turned.
+    pub fn push_strip(&mut self, strip: &[u32]) {
+        let triangles = strip.windows(3).enumerate();
+        self.triangles.extend(triangles.map(|(nth, t)| match nth % 2 {
+            0 => [t[0], t[1], t[2]],
+            _ => [t[1], t[0], t[2]],
+        }));
+    }
+
+    #[cfg(any(feature = "gltf", feature = "dae"))]
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
     }
 
     /// The mesh, after the fans of polygons that are not convex have given way to triangles inside them.

@@ -92,12 +92,7 @@ impl<'a> Content<'a> {
                         .iter()
                         .map(|&c| self.index(c, spot))
                         .collect::<Result<_, _>>()?;
-                    for (nth, t) in strip.windows(3).enumerate() {
-                        self.faces.push_triangle(match nth % 2 {
-                            0 => [t[0], t[1], t[2]],
-                            _ => [t[1], t[0], t[2]],
-                        });
-                    }
+                    self.faces.push_strip(&strip);
                 }
             }
             _ => {}
