@@ -43,6 +43,8 @@ mod family;
 mod start;
 mod train;
 
+mod structure;
+
 mod answer;
 mod evidence;
 mod mixture;
@@ -74,5 +76,9 @@ pub use interchange::Export;
 pub use mixture::{Mixture, Term};
 pub use model::{Model, Node};
 pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec};
+pub use structure::{
+    LearnedArc, LearnedStructure, StructureOptions, StructureRules, StructureScore, learn_structure,
+    score_structure,
+};
 pub use table::{Column, Table};
 pub use train::{NodeReport, TrainOptions, TrainReport, Trained, train};

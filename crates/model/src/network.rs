@@ -7,6 +7,7 @@ use serde::Deserialize;
 use crate::cpd::{Sign, Weights};
 use crate::error::{ModelError, list};
 use crate::model::{check_columns, topological_order};
+use crate::structure::{RawRules, StructureRules};
 
 /// Structure and training settings of a network, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +15,7 @@ pub struct Network {
     nodes: Vec<NodeSpec>,
     group: Option<String>,
     order: Vec<usize>,
+    structure: StructureRules,
 }
 
 /// One node of a [`Network`].
@@ -76,6 +78,8 @@ pub enum MixtureOrder {
 #[serde(deny_unknown_fields)]
 struct RawNetwork {
     group: Option<String>,
+    #[serde(default)]
+    structure: RawRules,
     #[serde(default)]
     node: Vec<RawNode>,
 }
@@ -155,6 +159,7 @@ impl Network {
         if let Some(node) = names.iter().find(|name| !seen.insert(name.as_str())) {
             return Err(ModelError::DuplicateNode { node: node.clone() });
         }
+        let structure = raw.structure.build(&names)?;
         let kinds: Vec<Kind> = raw.node.iter().map(|node| node.kind).collect();
         let mut nodes = Vec::with_capacity(names.len());
         for node in raw.node {
@@ -168,7 +173,48 @@ impl Network {
             nodes,
             group: raw.group,
             order,
+            structure,
         })
+    }
+
+    /// The same nodes with other arcs: positions of the parents, one list per node.
+    ///
+    /// # Errors
+    ///
+    /// The lists do not fit the nodes, a discrete node gets a continuous parent, or the arcs form a cycle.
+    pub fn with_parents(&self, parents: &[Vec<usize>]) -> Result<Self, ModelError> {
+        let n = self.nodes.len();
+        if parents.len() != n || parents.iter().flatten().any(|&parent| parent >= n) {
+            return Err(ModelError::Length {
+                what: "the lists of parents".into(),
+                found: parents.len(),
+                expected: n,
+            });
+        }
+        for (node, parents) in self.nodes.iter().zip(parents) {
+            let continuous = parents
+                .iter()
+                .find(|&&parent| !matches!(self.nodes[parent].kind, NodeKind::Discrete { .. }));
+            if let (NodeKind::Discrete { .. }, Some(&parent)) = (&node.kind, continuous) {
+                return Err(ModelError::ContinuousParent {
+                    node: node.name.clone(),
+                    parent: self.nodes[parent].name.clone(),
+                });
+            }
+        }
+        let names: Vec<&str> = self.nodes.iter().map(|node| node.name.as_str()).collect();
+        let order = topological_order(&names, parents)?;
+        let mut network = self.clone();
+        network.order = order;
+        for (node, parents) in network.nodes.iter_mut().zip(parents) {
+            node.parents.clone_from(parents);
+        }
+        Ok(network)
+    }
+
+    /// What the search for arcs must respect.
+    pub fn structure(&self) -> &StructureRules {
+        &self.structure
     }
 
     /// The nodes, in the file's order.

@@ -95,7 +95,7 @@ pub struct NodeReport {
 pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result<Trained, ModelError> {
     let weights = check_weights(table, options)?;
     let mut warnings = Vec::new();
-    let groups = read_groups(network, table, options, &mut warnings)?;
+    let groups = read_groups(network, table, options.group.as_deref(), &mut warnings)?;
     let mut families = Vec::with_capacity(network.nodes().len());
     for node in network.nodes() {
         families.push(Family::read(network, node, table, &weights, groups.as_deref())?);
@@ -215,14 +215,14 @@ fn check_weights(table: &Table, options: &TrainOptions) -> Result<Vec<f64>, Mode
 }
 
 /// A number for each row, equal where the rows belong together. Rows without a group stand alone.
-fn read_groups(
+pub(crate) fn read_groups(
     network: &Network,
     table: &Table,
-    options: &TrainOptions,
+    group: Option<&str>,
     warnings: &mut Vec<String>,
 ) -> Result<Option<Vec<usize>>, ModelError> {
-    let column = match (&options.group, network.group()) {
-        (Some(column), _) => column.as_str(),
+    let column = match (group, network.group()) {
+        (Some(column), _) => column,
         (None, Some(column)) => {
             if table.column(column).is_none() {
                 warnings.push(format!(

@@ -1,0 +1,483 @@
+//! What one family is worth: a node's distribution given a set of parents, fitted and weighed against its parameters.
+//!
+//! ```text
+//! BIC    Σ w log p(node | parents) − ½ n_parameters log N
+//! CV     Σ w log p(node | parents) over held-out folds
+//! ```
+//!
+//! p is the CPD that training would fit: a table, or for each configuration of the discrete parents a mixture of linear
+//! regressions on the continuous ones, with as many components as the score asks for. The score of a network is the sum
+//! over its families.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::cpd::{Sign, Weights, n_mixture_parameters};
+use crate::em::{CovariancePrior, Mixing, RIDGE, Rows, row_log_densities};
+use crate::error::ModelError;
+use crate::family::Family;
+use crate::network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec};
+use crate::start::{FitOptions, fit_mixture};
+use crate::table::Table;
+
+/// EM steps after which a further component must have paid half its price, or is given up.
+const TRIAL_STEPS: usize = 12;
+/// Share of that price.
+const TRIAL_SHARE: f64 = 0.5;
+/// Rows per free parameter of one component, as in training.
+const ROWS_PER_PARAMETER: f64 = 2.0;
+/// Least pseudo-count of a state under cross-validation, where a state of probability 0 would end every comparison.
+const LEAST_PRIOR: f64 = 0.01;
+
+/// Which score a search maximises.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StructureScore {
+    /// Log-likelihood − ½ parameters · log rows.
+    Bic,
+    /// Log density of held-out rows; groups are held out whole where a column names them.
+    CrossValidated {
+        /// Parts that the rows are cut into, at least 2.
+        folds: usize,
+    },
+}
+
+/// All nodes' values in complete rows, and how to score.
+pub(crate) struct Scorer {
+    nodes: Vec<NodeData>,
+    score: StructureScore,
+    /// Fold of each row.
+    folds: Vec<usize>,
+    seed: u64,
+    restarts: usize,
+    max_steps: usize,
+    max_components: usize,
+}
+
+/// How often each row counts.
+#[derive(Debug, Clone)]
+pub(crate) struct Sample(pub Vec<f64>);
+
+/// Effort of the fits inside a search.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FitEffort {
+    pub seed: u64,
+    pub restarts: usize,
+    pub max_steps: usize,
+    pub max_components: usize,
+}
+
+struct NodeData {
+    values: Values,
+    /// What one row counts as: less than 1 where the node is constant within groups.
+    share: f64,
+}
+
+enum Values {
+    Discrete {
+        states: Vec<usize>,
+        n_states: usize,
+        prior: f64,
+    },
+    Continuous {
+        /// Standardised, one entry per row.
+        y: Vec<Vec<f64>>,
+        spec: MixtureSpec,
+        floor: Vec<f64>,
+        /// Σ log of the columns' units: the density's change from standardised units to the columns' own.
+        log_unit: f64,
+    },
+}
+
+impl Scorer {
+    /// Reads a table whose rows are complete. `groups` numbers the rows that belong together.
+    pub fn read(
+        network: &Network,
+        table: &Table,
+        groups: Option<&[usize]>,
+        score: StructureScore,
+        effort: FitEffort,
+    ) -> Result<Self, ModelError> {
+        let n = table.n_rows();
+        let weights = vec![1.0; n];
+        let mut nodes = Vec::with_capacity(network.nodes().len());
+        for node in network.nodes() {
+            let alone = NodeSpec {
+                parents: Vec::new(),
+                ..node.clone()
+            };
+            let family = Family::read(network, &alone, table, &weights, None)?;
+            let mut share = 1.0;
+            let values = match &node.kind {
+                NodeKind::Discrete { states, prior } => Values::Discrete {
+                    states: family.states,
+                    n_states: states.len(),
+                    prior: *prior,
+                },
+                NodeKind::Mixture(spec) => {
+                    if let Some(groups) = groups {
+                        share = share_of_constant(&family.y, groups);
+                    }
+                    let unit = &family.scaling.standard_deviation;
+                    Values::Continuous {
+                        floor: spec.noise_floor.iter().zip(unit).map(|(f, s)| f / s).collect(),
+                        log_unit: unit.iter().map(|s| s.ln()).sum(),
+                        y: family.y,
+                        spec: spec.clone(),
+                    }
+                }
+            };
+            nodes.push(NodeData { values, share });
+        }
+        let folds = match score {
+            StructureScore::Bic => Vec::new(),
+            StructureScore::CrossValidated { folds } => (0..n)
+                .map(|row| fold_of(groups.map_or(row, |groups| groups[row]), folds, effort.seed))
+                .collect(),
+        };
+        Ok(Self {
+            nodes,
+            score,
+            folds,
+            seed: effort.seed,
+            restarts: effort.restarts,
+            max_steps: effort.max_steps,
+            max_components: effort.max_components,
+        })
+    }
+
+    /// The score of a family, in nats, in the columns' own units.
+    pub fn score(&self, sample: &Sample, node: usize, parents: &[usize]) -> f64 {
+        let rows: Vec<usize> = (0..sample.0.len()).filter(|&row| sample.0[row] > 0.0).collect();
+        let share = self.nodes[node].share;
+        let weights: Vec<f64> = rows.iter().map(|&row| sample.0[row] * share).collect();
+        let (configurations, n_configurations) = self.configurations(&rows, parents);
+        let continuous: Vec<&Vec<Vec<f64>>> = parents
+            .iter()
+            .filter_map(|&parent| match &self.nodes[parent].values {
+                Values::Continuous { y, .. } => Some(y),
+                Values::Discrete { .. } => None,
+            })
+            .collect();
+        let members = Members {
+            rows,
+            weights,
+            configurations,
+            n_configurations,
+        };
+        match &self.nodes[node].values {
+            Values::Discrete {
+                states,
+                n_states,
+                prior,
+            } => self.score_table(&members, states, *n_states, *prior),
+            Values::Continuous {
+                y,
+                spec,
+                floor,
+                log_unit,
+            } => {
+                let mixture = MixtureFamily {
+                    scorer: self,
+                    y,
+                    parents: continuous,
+                    spec,
+                    floor,
+                    stream: mixed(self.seed, node, parents),
+                };
+                let total: f64 = members.weights.iter().sum();
+                mixture.score(&members) - total * log_unit
+            }
+        }
+    }
+
+    /// Configuration of the discrete ones among the parents, per row, and how many there are.
+    fn configurations(&self, rows: &[usize], parents: &[usize]) -> (Vec<usize>, usize) {
+        let mut configurations = vec![0; rows.len()];
+        let mut n = 1;
+        for &parent in parents {
+            if let Values::Discrete { states, n_states, .. } = &self.nodes[parent].values {
+                n *= n_states;
+                for (configuration, &row) in configurations.iter_mut().zip(rows) {
+                    *configuration = *configuration * n_states + states[row];
+                }
+            }
+        }
+        (configurations, n)
+    }
+
+    fn score_table(&self, members: &Members, states: &[usize], n_states: usize, prior: f64) -> f64 {
+        let count = |keep: &dyn Fn(usize) -> bool| {
+            let mut counts = vec![0.0; members.n_configurations * n_states];
+            for (i, &row) in members.rows.iter().enumerate().filter(|(_, row)| keep(**row)) {
+                counts[members.configurations[i] * n_states + states[row]] += members.weights[i];
+            }
+            counts
+        };
+        match self.score {
+            StructureScore::Bic => {
+                let counts = count(&|_| true);
+                let mut sum = 0.0;
+                for row in counts.chunks(n_states) {
+                    let total: f64 = row.iter().sum();
+                    sum += row
+                        .iter()
+                        .filter(|count| **count > 0.0)
+                        .map(|count| count * (count / total).ln())
+                        .sum::<f64>();
+                }
+                sum - 0.5 * (members.n_configurations * (n_states - 1)) as f64 * members.log_n()
+            }
+            StructureScore::CrossValidated { folds } => (0..folds)
+                .map(|fold| {
+                    let prior = prior.max(LEAST_PRIOR);
+                    let known = count(&|row| self.folds[row] != fold);
+                    let held = count(&|row| self.folds[row] == fold);
+                    known
+                        .chunks(n_states)
+                        .zip(held.chunks(n_states))
+                        .map(|(known, held)| {
+                            let total: f64 = known.iter().sum::<f64>() + prior * n_states as f64;
+                            known
+                                .iter()
+                                .zip(held)
+                                .map(|(k, h)| h * ((k + prior) / total).ln())
+                                .sum::<f64>()
+                        })
+                        .sum::<f64>()
+                })
+                .sum(),
+        }
+    }
+}
+
+/// Rows of the sample with what they count, and the configuration of the discrete parents.
+struct Members {
+    rows: Vec<usize>,
+    weights: Vec<f64>,
+    configurations: Vec<usize>,
+    n_configurations: usize,
+}
+
+impl Members {
+    fn log_n(&self) -> f64 {
+        self.weights.iter().sum::<f64>().max(1.0).ln()
+    }
+}
+
+/// A continuous node with one set of parents.
+struct MixtureFamily<'a> {
+    scorer: &'a Scorer,
+    y: &'a [Vec<f64>],
+    parents: Vec<&'a Vec<Vec<f64>>>,
+    spec: &'a MixtureSpec,
+    floor: &'a [f64],
+    stream: u64,
+}
+
+/// A mixture of one cell with its unpenalised log-likelihood there.
+struct CellFit {
+    mixing: Mixing,
+    log_likelihood: f64,
+    n_parameters: usize,
+}
+
+impl MixtureFamily<'_> {
+    fn score(&self, members: &Members) -> f64 {
+        match self.scorer.score {
+            StructureScore::Bic => {
+                let all: Vec<usize> = (0..members.rows.len()).collect();
+                let cells = self.fit(members, &all);
+                let log_n = members.log_n();
+                cells
+                    .iter()
+                    .map(|cell| cell.log_likelihood - 0.5 * cell.n_parameters as f64 * log_n)
+                    .sum()
+            }
+            StructureScore::CrossValidated { folds } => (0..folds)
+                .map(|fold| {
+                    let (held, known): (Vec<usize>, Vec<usize>) =
+                        (0..members.rows.len()).partition(|&i| self.scorer.folds[members.rows[i]] == fold);
+                    let cells = self.fit(members, &known);
+                    (0..cells.len())
+                        .map(|cell| {
+                            let rows = self.rows(members, &self.of_cell(members, &held, cell));
+                            weighted(&rows, &cells[cell].mixing)
+                        })
+                        .sum::<f64>()
+                })
+                .sum(),
+        }
+    }
+
+    fn shared(&self) -> bool {
+        self.spec.weights == Weights::Shared
+    }
+
+    fn of_cell(&self, members: &Members, among: &[usize], cell: usize) -> Vec<usize> {
+        among
+            .iter()
+            .copied()
+            .filter(|&i| self.shared() || members.configurations[i] == cell)
+            .collect()
+    }
+
+    /// One mixture per configuration, or a single one where components are shared.
+    fn fit(&self, members: &Members, among: &[usize]) -> Vec<CellFit> {
+        let n_cells = if self.shared() {
+            1
+        } else {
+            members.n_configurations
+        };
+        let log_n = members.log_n();
+        let mut pooled: Option<CellFit> = None;
+        (0..n_cells)
+            .map(|cell| {
+                let rows = self.rows(members, &self.of_cell(members, among, cell));
+                if n_cells == 1 || rows.total_weight() >= rows.least_mass() {
+                    return self.best(&rows, cell, log_n);
+                }
+                // Too few rows: one component over all configurations stands in, as in training. It costs as much as
+                // one of the cell's own, so that splitting rows thinly never pays.
+                let pooled = pooled.get_or_insert_with(|| {
+                    let all = self.rows(members, among);
+                    self.fit_one(&all, 1, cell, self.scorer.max_steps)
+                });
+                CellFit {
+                    mixing: pooled.mixing.clone(),
+                    log_likelihood: weighted(&rows, &pooled.mixing),
+                    n_parameters: pooled.n_parameters,
+                }
+            })
+            .collect()
+    }
+
+    /// As many components as the score asks for: more while each is worth its price.
+    fn best(&self, rows: &Rows, cell: usize, log_n: f64) -> CellFit {
+        let carried = (rows.total_weight() / rows.least_mass()) as usize;
+        let most = match self.spec.order {
+            MixtureOrder::Fixed(k) => {
+                return self.fit_one(rows, k.min(carried).max(1), cell, self.scorer.max_steps);
+            }
+            MixtureOrder::Bic { max, .. } => max.min(self.scorer.max_components),
+        };
+        let one = n_mixture_parameters(1, rows.d, rows.q()) as f64;
+        let most = most
+            .min((rows.total_weight() / (ROWS_PER_PARAMETER * one)) as usize)
+            .min(carried);
+        let mut best = self.fit_one(rows, 1, cell, self.scorer.max_steps);
+        for k in 2..=most {
+            let worth = |fit: &CellFit| fit.log_likelihood - 0.5 * fit.n_parameters as f64 * log_n;
+            let trial = self.fit_one(rows, k, cell, TRIAL_STEPS);
+            let price = 0.5 * (trial.n_parameters.saturating_sub(best.n_parameters)) as f64 * log_n;
+            if trial.log_likelihood - best.log_likelihood < TRIAL_SHARE * price {
+                break;
+            }
+            let fit = self.fit_one(rows, k, cell, self.scorer.max_steps);
+            let fit = if worth(&trial) > worth(&fit) { trial } else { fit };
+            if worth(&fit) <= worth(&best) {
+                break;
+            }
+            best = fit;
+        }
+        best
+    }
+
+    fn fit_one(&self, rows: &Rows, k: usize, cell: usize, max_steps: usize) -> CellFit {
+        let options = FitOptions {
+            restarts: self.scorer.restarts,
+            max_steps,
+            tolerance: 1e-5,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(mixed(self.stream, k, &[cell]));
+        let fit = fit_mixture(rows, k, options, &mut rng).fit;
+        let k = fit.mixing.components.len();
+        let gaussians = n_mixture_parameters(k, rows.d, rows.q()) - (k - 1);
+        CellFit {
+            n_parameters: gaussians + rows.n_cells * (k - 1),
+            log_likelihood: fit.log_likelihood,
+            mixing: fit.mixing,
+        }
+    }
+
+    fn rows(&self, members: &Members, cell: &[usize]) -> Rows {
+        let d = self.spec.columns.len();
+        let mut values = Vec::with_capacity(cell.len());
+        for &i in cell {
+            let row = members.rows[i];
+            let mut z = self.y[row].clone();
+            z.push(1.0);
+            for parent in &self.parents {
+                z.extend_from_slice(&parent[row]);
+            }
+            values.push(z);
+        }
+        let q = self
+            .parents
+            .iter()
+            .map(|parent| parent.first().map_or(0, Vec::len))
+            .sum::<usize>();
+        Rows {
+            d,
+            z: faer::Mat::from_fn(d + 1 + q, cell.len(), |i, j| values[j][i]),
+            weights: cell.iter().map(|&i| members.weights[i]).collect(),
+            cell: cell
+                .iter()
+                .map(|&i| {
+                    if self.shared() {
+                        members.configurations[i]
+                    } else {
+                        0
+                    }
+                })
+                .collect(),
+            n_cells: if self.shared() {
+                members.n_configurations
+            } else {
+                1
+            },
+            floor: self.floor.to_vec(),
+            latent_sign: self.spec.sign == Sign::Latent,
+            ridge: vec![RIDGE; 1 + q],
+            prior: CovariancePrior::WEAK,
+        }
+    }
+}
+
+/// Σ w log p of rows.
+fn weighted(rows: &Rows, mixing: &Mixing) -> f64 {
+    if rows.n() == 0 {
+        return 0.0;
+    }
+    let densities = row_log_densities(rows, mixing);
+    densities
+        .iter()
+        .zip(&rows.weights)
+        .map(|(density, weight)| density * weight)
+        .sum()
+}
+
+/// Groups per row where every group has one value and some group several rows; otherwise 1.
+fn share_of_constant(values: &[Vec<f64>], groups: &[usize]) -> f64 {
+    let mut first = std::collections::BTreeMap::new();
+    for (value, group) in values.iter().zip(groups) {
+        let known: &Vec<f64> = first.entry(*group).or_insert(value);
+        // In standardised units: what a text file's sixth digit may change.
+        if known.iter().zip(value).any(|(a, b)| (a - b).abs() > 1e-5) {
+            return 1.0;
+        }
+    }
+    first.len() as f64 / values.len().max(1) as f64
+}
+
+/// A seed that follows from several numbers.
+fn mixed(seed: u64, first: usize, more: &[usize]) -> u64 {
+    more.iter().chain([&first]).fold(seed, |mixed, &part| {
+        (mixed ^ (part as u64 + 1))
+            .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            .rotate_left(29)
+    })
+}
+
+fn fold_of(unit: usize, folds: usize, seed: u64) -> usize {
+    (mixed(seed, unit, &[]) >> 11) as usize % folds
+}
