@@ -27,6 +27,7 @@
 mod error;
 
 mod network;
+mod network_text;
 mod table;
 
 mod binary;
