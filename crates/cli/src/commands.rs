@@ -12,6 +12,7 @@ mod grasps;
 mod hand;
 mod imitate;
 mod label;
+mod learn_structure;
 mod mesh;
 mod model;
 mod pipeline;
@@ -21,6 +22,7 @@ mod query;
 mod shape_input;
 mod synthesize;
 mod train;
+mod training_rows;
 
 /// What `prehend` can be asked to do.
 #[derive(Subcommand)]
@@ -47,6 +49,8 @@ pub enum Command {
     Label(label::Arguments),
     /// Learn a network from tables
     Train(train::Arguments),
+    /// Learn the arcs of a network from tables
+    LearnStructure(learn_structure::Arguments),
     /// Ask a model: any nodes given any others
     Query(query::Arguments),
     /// Choose object and grasp that best imitate a demonstration
@@ -72,6 +76,7 @@ impl Command {
             Self::Close(a) => a.run(json),
             Self::Label(a) => a.run(json),
             Self::Train(a) => a.run(json),
+            Self::LearnStructure(a) => a.run(json),
             Self::Query(a) => a.run(json),
             Self::Imitate(a) => a.run(json),
             Self::Grasps(a) => a.run(json),

@@ -380,3 +380,93 @@ fn grasps_become_labels_a_model_a_plan_and_an_imitation() {
         );
     }
 }
+
+#[test]
+fn arcs_are_learned_written_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = String::from("task,width,height,object\n");
+    for i in 0..240 {
+        let width = f64::from(i % 2) + 0.01 * f64::from(i % 17);
+        let height = 2.0 * width + 0.02 * f64::from((i * 7) % 13);
+        let task = if i % 2 == 0 { "pour" } else { "use" };
+        let _ = writeln!(rows, "{task},{width},{height},o{}", i % 12);
+    }
+    let data = put(folder.path(), "rows.csv", &rows);
+    let nodes = "[[node]]\nname = \"task\"\nkind = \"discrete\"\nstates = [\"pour\", \"use\"]\n\
+                 [[node]]\nname = \"width\"\nkind = \"gaussian_mixture\"\n[[node]]\nname = \"height\"\nkind = \"gaussian_mixture\"\n\
+                 [structure]\ntiers = [[\"task\"], [\"width\"], [\"height\"]]\n";
+    let network = put(folder.path(), "nodes.toml", nodes);
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (learned, svg, dot) = (place("learned.toml"), place("learned.svg"), place("learned.dot"));
+    let arguments = [
+        "learn-structure",
+        &data,
+        "--network",
+        &network,
+        "--bootstrap",
+        "5",
+        "--out",
+        &learned,
+        "--picture",
+        &svg,
+        "--json",
+    ];
+    let answer = prehend(&arguments, "").answer();
+    let arcs: Vec<(&str, &str)> = answer["arcs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|arc| (arc["from"].as_str().unwrap(), arc["to"].as_str().unwrap()))
+        .collect();
+    assert!(
+        arcs.contains(&("task", "width")) && arcs.contains(&("width", "height")),
+        "{arcs:?}"
+    );
+    assert!(answer["score"].as_f64() > answer["given_score"].as_f64());
+    assert!(answer["arcs"][0]["confidence"].as_f64().is_some_and(|c| c > 0.0));
+    assert!(std::fs::read_to_string(&svg).unwrap().contains(">width<"));
+    let out = place("models");
+    let trained = prehend(
+        &["train", &data, "--network", &learned, "--out", &out, "--json"],
+        "",
+    )
+    .answer();
+    assert_eq!(number(&trained["rows"]), 240.0);
+    prehend(
+        &[
+            "learn-structure",
+            &data,
+            "--network",
+            &network,
+            "--picture",
+            &dot,
+            "--json",
+        ],
+        "",
+    )
+    .answer();
+    assert!(
+        std::fs::read_to_string(&dot)
+            .unwrap()
+            .contains("\"task\" -> \"width\"")
+    );
+    let wrong = prehend(
+        &[
+            "learn-structure",
+            &data,
+            "--network",
+            &network,
+            "--picture",
+            "x.png",
+        ],
+        "",
+    );
+    assert_eq!(wrong.status, 2);
+    assert!(
+        wrong
+            .stderr
+            .contains("expected a file name that ends in .svg or .dot"),
+        "{}",
+        wrong.stderr
+    );
+}

@@ -192,9 +192,7 @@ impl Network {
             });
         }
         for (node, parents) in self.nodes.iter().zip(parents) {
-            let continuous = parents
-                .iter()
-                .find(|&&parent| !matches!(self.nodes[parent].kind, NodeKind::Discrete { .. }));
+            let continuous = parents.iter().find(|&&parent| !self.nodes[parent].is_discrete());
             if let (NodeKind::Discrete { .. }, Some(&parent)) = (&node.kind, continuous) {
                 return Err(ModelError::ContinuousParent {
                     node: node.name.clone(),
@@ -239,6 +237,11 @@ impl Network {
 }
 
 impl NodeSpec {
+    /// Whether the node has states.
+    pub fn is_discrete(&self) -> bool {
+        matches!(self.kind, NodeKind::Discrete { .. })
+    }
+
     /// Columns of a table that hold this node's values: a discrete node's column has its name.
     pub fn columns(&self) -> Vec<String> {
         match &self.kind {

@@ -79,6 +79,32 @@ impl Pen {
         );
     }
 
+    /// A rectangle with round corners of this radius.
+    pub(crate) fn rounded(&mut self, [x, y, w, h]: [f64; 4], radius: f64, fill: &str, stroke: &str) {
+        let _ = write!(
+            self.body,
+            r#"<rect x="{x:.1}" y="{y:.1}" width="{w:.1}" height="{h:.1}" rx="{radius}" fill="{fill}" stroke="{stroke}" stroke-width="1.4"/>"#
+        );
+    }
+
+    /// A line along SVG path commands.
+    pub(crate) fn path(&mut self, commands: &str, stroke: &str, width: f64, opacity: f64) {
+        let _ = write!(
+            self.body,
+            r#"<path d="{commands}" fill="none" stroke="{stroke}" stroke-width="{width:.2}" stroke-opacity="{opacity:.2}"/>"#
+        );
+    }
+
+    /// A filled polygon.
+    pub(crate) fn polygon(&mut self, points: &[[f64; 2]], fill: &str, opacity: f64) {
+        let corners: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        let _ = write!(
+            self.body,
+            r#"<polygon points="{}" fill="{fill}" fill-opacity="{opacity:.2}"/>"#,
+            corners.join(" ")
+        );
+    }
+
     pub(crate) fn text(&mut self, [x, y]: [f64; 2], anchor: Anchor, size: f64, fill: &str, text: &str) {
         self.styled_text([x, y], anchor, size, fill, "", text);
     }

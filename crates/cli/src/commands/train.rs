@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use prehend::frame::Frame;
-use prehend::labels::LabelStore;
-use prehend::model::{ModelError, TrainOptions, TrainReport, Trained};
+use prehend::model::{TrainOptions, TrainReport, Trained};
 use prehend::stages::learn::{NamedNetwork, write_model};
-use prehend::training::{balanced_rows, labelled_copies, to_table};
+use prehend::training::to_table;
 use serde_json::{Value, json};
 
-use super::grasps::{listed, read_tables};
-use crate::output::{self, Outcome, Usage};
+use super::training_rows::TrainingRows;
+use crate::output::{self, Outcome};
 
 /// Learn a network from tables
 #[derive(clap::Args)]
@@ -20,9 +19,8 @@ use crate::output::{self, Outcome, Usage};
   prehend train data.csv --network mine.toml --out models --json"
 )]
 pub struct Arguments {
-    /// Tables (.parquet, .csv, .jsonl) or folders of them
-    #[arg(required = true)]
-    data: Vec<PathBuf>,
+    #[command(flatten)]
+    rows: TrainingRows,
 
     /// The network: nodes, arcs, mixtures
     #[arg(long)]
@@ -32,22 +30,6 @@ pub struct Arguments {
     #[arg(long)]
     out: Option<PathBuf>,
 
-    /// Labels for grasp tables: each grasp enters once for each task that it affords
-    #[arg(long)]
-    labels: Option<PathBuf>,
-
-    /// Whose labels
-    #[arg(long, default_value = "strict", requires = "labels")]
-    persona: String,
-
-    /// Balance the rows: each value of this column as often as the rarest
-    #[arg(long)]
-    balance: Option<String>,
-
-    /// Rows of one value of this column are no independent evidence (for example `object`)
-    #[arg(long)]
-    group: Option<String>,
-
     /// Column that says which rows are held out
     #[arg(long, default_value = "object")]
     holdout_column: String,
@@ -55,60 +37,26 @@ pub struct Arguments {
     /// Values of that column to hold out, separated by commas
     #[arg(long, value_delimiter = ',')]
     holdout: Vec<String>,
-
-    /// Seed of balancing and of EM's starts
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
         let network = NamedNetwork::read(&self.network)?;
-        let mut frame = read_tables(&self.data)?;
-        if let Some(labels) = &self.labels {
-            if !labels.is_file() {
-                bail!(Usage(format!("--labels {}: no such file", labels.display())));
-            }
-            let answers = LabelStore::open(labels)?.answers(&self.persona, &[])?;
-            if answers.is_empty() {
-                bail!(
-                    "{}: holds no labels of persona `{}`",
-                    labels.display(),
-                    self.persona
-                );
-            }
-            frame = labelled_copies(&frame, &answers)?;
-        } else if frame.column("task").is_none()
-            && frame.column("grasp_id").is_some()
-            && asks_for_task(&network)
-        {
-            bail!(
-                "these are grasp tables without a column `task`, which the network's node `task` needs; \
-                 give --labels out/labels.sqlite, or make labels with `prehend label`"
-            );
-        }
+        let frame = self.rows.read(&network.network)?;
         let (kept, held_out) = self.split(&frame)?;
-        let rows = match &self.balance {
-            Some(column) => kept.select(&balanced_rows(&kept, column, self.group.as_deref(), self.seed)?),
-            None => kept,
+        let why = if self.holdout.is_empty() {
+            ""
+        } else {
+            " after holding out"
         };
-        if rows.n_rows() == 0 {
-            bail!(
-                "there are no rows to learn from{}",
-                if self.holdout.is_empty() {
-                    ""
-                } else {
-                    " after holding out"
-                }
-            );
-        }
+        let rows = self.rows.balanced(kept, why)?;
         let options = TrainOptions {
-            seed: self.seed,
-            group: self.group.clone(),
+            seed: self.rows.seed,
+            group: self.rows.group.clone(),
             ..TrainOptions::default()
         };
         let Trained { model, report } = prehend::model::train(&network.network, &to_table(&rows)?, &options)
-            .map_err(|e| counted_from_one(e).context(listed(&self.data)))?;
+            .map_err(|e| self.rows.blame(e))?;
         let held_out_likelihood = if held_out.n_rows() == 0 {
             None
         } else {
@@ -124,8 +72,8 @@ impl Arguments {
         });
         if let Some(out) = &self.out {
             let provenance = json!({
-                "network": network.name, "seed": self.seed, "rows": rows.n_rows(),
-                "balanced_by": self.balance, "held_out": self.holdout,
+                "network": network.name, "seed": self.rows.seed, "rows": rows.n_rows(),
+                "balanced_by": self.rows.balance, "held_out": self.holdout,
             });
             write_model(
                 &out.join(&network.name),
@@ -150,26 +98,6 @@ impl Arguments {
         let (held, kept): (Vec<usize>, Vec<usize>) =
             (0..values.len()).partition(|&r| self.holdout.contains(&values[r]));
         Ok((frame.select(&kept), frame.select(&held)))
-    }
-}
-
-fn asks_for_task(network: &NamedNetwork) -> bool {
-    network.network.nodes().iter().any(|node| node.name == "task")
-}
-
-/// A cell's error with its row as a person counts.
-fn counted_from_one(error: ModelError) -> anyhow::Error {
-    match error {
-        ModelError::Cell {
-            column,
-            row,
-            found,
-            expected,
-        } => anyhow::anyhow!(
-            "column `{column}`, row {} of those to learn from (counted from 1): found {found}, expected {expected}",
-            row + 1
-        ),
-        other => other.into(),
     }
 }
 

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use crate::error::{ModelError, list};
 use crate::model::topological_order;
-use crate::network::{Network, NodeKind};
+use crate::network::Network;
 
 /// What the table `[structure]` of a network file says, by position of the nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -100,7 +100,7 @@ impl Legal {
         let why_not = |from: usize, to: usize| -> Option<&'static str> {
             if from == to {
                 Some("an arc needs two nodes")
-            } else if is_discrete(network, to) && !is_discrete(network, from) {
+            } else if nodes[to].is_discrete() && !nodes[from].is_discrete() {
                 Some("a discrete node has no continuous parent; turn the arc round")
             } else if matches!((tier_of[from], tier_of[to]), (Some(a), Some(b)) if a > b) {
                 Some("`tiers` forbid it")
@@ -161,10 +161,6 @@ impl Legal {
             .filter(|&from| self.required[from][to])
             .collect()
     }
-}
-
-pub(crate) fn is_discrete(network: &Network, node: usize) -> bool {
-    matches!(network.nodes()[node].kind, NodeKind::Discrete { .. })
 }
 
 #[cfg(test)]
