@@ -105,7 +105,7 @@ impl<'a> BatchQuery<'a> {
                         .into_iter()
                         .map(|state| state.map_or(f64::NAN, |state| state as f64))
                         .collect(),
-                    Cpd::Mixture(_) => table.numbers(&column, &node.name)?,
+                    Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => table.numbers(&column, &node.name)?,
                 };
                 for (row, cell) in rows.iter_mut().zip(cells) {
                     row.push(cell);
@@ -156,7 +156,7 @@ impl<'a> BatchQuery<'a> {
                         expected: format!("a state's index below {}", cpd.states.len()),
                     })?)
                 }
-                Cpd::Mixture(_) => Observation::Value(value.to_vec()),
+                Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => Observation::Value(value.to_vec()),
             };
             evidence = evidence.with(self.model, &node.name, observation)?;
         }

@@ -16,6 +16,7 @@ use sha2::{Digest, Sha256};
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::ModelError;
 use crate::model::{Model, Node};
+use crate::von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};
 
 const MAGIC: &[u8; 8] = b"PREHENDM";
 const VERSION: u32 = 2;
@@ -53,6 +54,12 @@ enum StoredCpd {
         sphere: bool,
         scaling: Option<Scaling>,
         components: Vec<Vec<StoredComponent>>,
+    },
+    VonMisesFisher {
+        columns: Vec<String>,
+        discrete_parents: Vec<usize>,
+        /// Weight, direction and concentration.
+        components: Vec<Vec<(f64, Vec<f64>, f64)>>,
     },
 }
 
@@ -192,6 +199,19 @@ fn store(cpd: &Cpd) -> StoredCpd {
             parents: positions(&cpd.parents),
             table: cpd.table.clone(),
         },
+        Cpd::VonMisesFisher(cpd) => StoredCpd::VonMisesFisher {
+            columns: cpd.columns.clone(),
+            discrete_parents: positions(&cpd.discrete_parents),
+            components: cpd
+                .components
+                .iter()
+                .map(|row| {
+                    row.iter()
+                        .map(|c| (c.weight, c.direction.iter().copied().collect(), c.concentration))
+                        .collect()
+                })
+                .collect(),
+        },
         Cpd::Mixture(cpd) => StoredCpd::Mixture {
             columns: cpd.columns.clone(),
             discrete_parents: positions(&cpd.discrete_parents),
@@ -230,6 +250,26 @@ fn load(name: &str, cpd: StoredCpd) -> Result<Cpd, ModelError> {
             states,
             parents: nodes(parents),
             table,
+        }),
+        StoredCpd::VonMisesFisher {
+            columns,
+            discrete_parents,
+            components,
+        } => Cpd::VonMisesFisher(VonMisesFisherCpd {
+            columns,
+            discrete_parents: nodes(discrete_parents),
+            components: components
+                .into_iter()
+                .map(|row| {
+                    row.into_iter()
+                        .map(|(weight, direction, concentration)| VonMisesFisher {
+                            weight,
+                            direction: nalgebra::DVector::from_vec(direction),
+                            concentration,
+                        })
+                        .collect()
+                })
+                .collect(),
         }),
         StoredCpd::Mixture {
             columns,

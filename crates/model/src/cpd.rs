@@ -5,6 +5,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::gaussian::{cholesky, log_normal_in_place, log_sum_exp, semidefinite_root};
+use crate::von_mises_fisher::VonMisesFisherCpd;
 
 /// Weights that the configurations share agree within this: rounding of a sum of responsibilities.
 const WEIGHT_TOLERANCE: f64 = 1e-9;
@@ -20,6 +21,8 @@ pub enum Cpd {
     Discrete(DiscreteCpd),
     /// A vector of real numbers.
     Mixture(MixtureCpd),
+    /// A unit vector.
+    VonMisesFisher(VonMisesFisherCpd),
 }
 
 /// A table of probabilities.
@@ -240,7 +243,7 @@ impl Component {
 }
 
 /// An index drawn by weights that sum to about 1.
-fn draw(weights: impl Iterator<Item = f64> + Clone, rng: &mut impl Rng) -> usize {
+pub(crate) fn draw(weights: impl Iterator<Item = f64> + Clone, rng: &mut impl Rng) -> usize {
     let total: f64 = weights.clone().sum();
     let mut left = rng.random::<f64>() * total;
     let mut last = 0;

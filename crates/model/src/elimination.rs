@@ -249,7 +249,7 @@ impl<'a> Elimination<'a> {
     fn log_table(&self, idx: NodeIdx, states: &[usize]) -> f64 {
         match &self.model.node(idx).cpd {
             Cpd::Discrete(cpd) => cpd.log_density(self.model.configuration(idx, states), states[idx.0]),
-            Cpd::Mixture(_) => 0.0,
+            Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => 0.0,
         }
     }
 
@@ -264,6 +264,9 @@ impl<'a> Elimination<'a> {
             .flat_map(|&parent| full_value(self.evidence, parent).unwrap_or_default())
             .copied()
             .collect();
+        if let Cpd::VonMisesFisher(cpd) = &self.model.node(idx).cpd {
+            return Ok(self.latent.join(&cpd.log_terms(configuration, value)));
+        }
         let terms = self.model.log_components(idx, configuration, value, &parents)?;
         let logs: Vec<f64> = terms.into_iter().map(|(_, log)| log).collect();
         Ok(self.latent.join(&logs))

@@ -11,6 +11,9 @@ use crate::gaussian::cholesky;
 use crate::model::Model;
 use crate::table::{Table, state_at};
 
+/// How far from 1 the length of a direction may be: what three printed digits of each coordinate allow.
+const UNIT_TOLERANCE: f64 = 2e-3;
+
 /// What is known of one node.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Observation {
@@ -49,6 +52,12 @@ impl Evidence {
     pub fn with(mut self, model: &Model, node: &str, observation: Observation) -> Result<Self, ModelError> {
         let idx = model.index(node)?;
         check(model, idx, &observation)?;
+        let observation = match (&model.node(idx).cpd, observation) {
+            (Cpd::VonMisesFisher(_), Observation::Value(value)) => {
+                Observation::Value(unit_vector(node, &value)?)
+            }
+            (_, other) => other,
+        };
         self.entries.insert(idx, observation);
         Ok(self)
     }
@@ -119,7 +128,7 @@ impl Evidence {
                         }
                     }
                 }
-                Cpd::Mixture(_) => {
+                Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => {
                     let mut values = vec![vec![f64::NAN; columns.len()]; table.n_rows()];
                     for (d, column) in columns.iter().enumerate() {
                         if table.column(column).is_some() {
@@ -130,6 +139,10 @@ impl Evidence {
                     }
                     for (row, value) in rows.iter_mut().zip(values) {
                         if value.iter().any(|v| !v.is_nan()) {
+                            let value = match &node.cpd {
+                                Cpd::VonMisesFisher(_) => unit_vector(&node.name, &value)?,
+                                _ => value,
+                            };
                             row.entries.insert(NodeIdx(i), Observation::Value(value));
                         }
                     }
@@ -180,6 +193,10 @@ fn read_observation(model: &Model, idx: NodeIdx, value: &Value) -> Result<Observ
                 likelihood[state] = number.as_f64().ok_or_else(expected)?;
             }
             Ok(Observation::Likelihood(likelihood))
+        }
+        Cpd::VonMisesFisher(_) => {
+            let expected = || bad("an array with the numbers of a unit vector".into());
+            Ok(Observation::Value(numbers(value, false).ok_or_else(expected)?))
         }
         Cpd::Mixture(cpd) => {
             let d = cpd.dim();
@@ -258,6 +275,19 @@ pub(crate) fn read_state(model: &Model, idx: NodeIdx, value: &Value) -> Result<u
     })
 }
 
+/// The vector with length 1 to the last digit; what is farther off than text files round is no direction.
+pub(crate) fn unit_vector(node: &str, value: &[f64]) -> Result<Vec<f64>, ModelError> {
+    let length = value.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if !length.is_finite() || (length - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(ModelError::BadValue {
+            node: node.into(),
+            found: format!("{value:?} of length {length}"),
+            expected: "a whole unit vector; divide it by its length".into(),
+        });
+    }
+    Ok(value.iter().map(|v| v / length).collect())
+}
+
 /// Whether an observation fits its node.
 fn check(model: &Model, idx: NodeIdx, observation: &Observation) -> Result<(), ModelError> {
     let node = model.node(idx);
@@ -286,6 +316,14 @@ fn check(model: &Model, idx: NodeIdx, observation: &Observation) -> Result<(), M
             }
         }
         (Cpd::Discrete(_), _) => bad("numbers".into(), "a state, as the node is discrete".into()),
+        (Cpd::VonMisesFisher(cpd), Observation::Value(value)) if value.len() == cpd.dim() => Ok(()),
+        (Cpd::VonMisesFisher(cpd), _) => bad(
+            "no exact direction".into(),
+            format!(
+                "a unit vector of {} numbers; a node of this kind is observed whole or not at all",
+                cpd.dim()
+            ),
+        ),
         (Cpd::Mixture(cpd), Observation::Value(value)) => {
             if value.len() == cpd.dim() && !value.iter().any(|v| v.is_infinite()) {
                 Ok(())

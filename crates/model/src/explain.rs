@@ -133,7 +133,8 @@ impl Model {
     /// As [`Model::posterior`].
     pub fn most_probable(&self, evidence: &Evidence) -> Result<MostProbable, ModelError> {
         let is_free = |idx: NodeIdx| match (&self.node(idx).cpd, evidence.get(idx)) {
-            (Cpd::Discrete(_), Some(Observation::State(_))) => false,
+            // Directions are not Gaussian: they are left out, and asked about by themselves.
+            (Cpd::Discrete(_), Some(Observation::State(_))) | (Cpd::VonMisesFisher(_), _) => false,
             (Cpd::Mixture(_), Some(Observation::Value(value))) => value.iter().any(|v| v.is_nan()),
             _ => true,
         };

@@ -54,6 +54,8 @@ impl Family {
                         configurations[row] = configurations[row] * states.len() + state.unwrap_or(0);
                     }
                 }
+                // A network has no arcs from such a node.
+                NodeKind::VonMisesFisher(_) => {}
                 NodeKind::Mixture(spec) => {
                     parent_specs.push(spec);
                     append(&mut p, &mut complete, table, &parent.name, spec)?;
@@ -73,6 +75,8 @@ impl Family {
                     states[row] = state.unwrap_or(0);
                 }
             }
+            // Such a node reads its own rows.
+            NodeKind::VonMisesFisher(_) => {}
             NodeKind::Mixture(spec) => append(&mut y, &mut complete, table, &node.name, spec)?,
         }
         let rows: Vec<usize> = (0..n).filter(|&row| complete[row]).collect();
@@ -91,7 +95,7 @@ impl Family {
         let weights: Vec<f64> = rows.iter().map(|&row| weights[row]).collect();
         let scaling = match &node.kind {
             NodeKind::Mixture(spec) => standardise(&mut y, &weights, &[spec]),
-            NodeKind::Discrete { .. } => Scaling {
+            NodeKind::Discrete { .. } | NodeKind::VonMisesFisher(_) => Scaling {
                 mean: vec![],
                 standard_deviation: vec![],
             },

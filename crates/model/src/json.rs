@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::{ModelError, list};
 use crate::model::{Model, Node};
+use crate::von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};
 
 /// Value of the key `format`.
 pub const FORMAT: &str = "prehend-model";
@@ -40,6 +41,23 @@ struct RawMixture {
     scaling: Option<Scaling>,
     #[serde(flatten)]
     extra: Map<String, Value>,
+}
+
+#[derive(Deserialize)]
+struct RawDirections {
+    columns: Vec<String>,
+    #[serde(default)]
+    discrete_parents: Vec<String>,
+    components: Vec<Vec<RawDirection>>,
+    #[serde(flatten)]
+    extra: Map<String, Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct RawDirection {
+    weight: f64,
+    direction: Vec<f64>,
+    concentration: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -161,6 +179,19 @@ fn read_node(name: String, mut node: Map<String, Value>, names: &[String]) -> Re
                 raw.extra,
             )
         }
+        Some("von_mises_fisher_mixture") => {
+            let raw: RawDirections = serde_json::from_value(body).map_err(|e| at(e.to_string()))?;
+            let cpd = VonMisesFisherCpd {
+                discrete_parents: find(&raw.discrete_parents)?,
+                columns: raw.columns,
+                components: raw
+                    .components
+                    .into_iter()
+                    .map(|row| row.into_iter().map(RawDirection::build).collect())
+                    .collect(),
+            };
+            (Cpd::VonMisesFisher(cpd), raw.extra)
+        }
         Some("gaussian_mixture") => {
             let raw: RawMixture = serde_json::from_value(body).map_err(|e| at(e.to_string()))?;
             let columns = raw.columns.unwrap_or_else(|| vec![name.clone()]);
@@ -194,13 +225,23 @@ fn read_node(name: String, mut node: Map<String, Value>, names: &[String]) -> Re
         }
         _ => {
             let problem = format!(
-                "`kind` is {}; expected \"discrete\" or \"gaussian_mixture\"",
+                "`kind` is {}; expected \"discrete\", \"gaussian_mixture\" or \"von_mises_fisher_mixture\"",
                 show(kind.as_ref())
             );
             return Err(at(problem));
         }
     };
     Ok(Node { name, cpd, extra })
+}
+
+impl RawDirection {
+    fn build(self) -> VonMisesFisher {
+        VonMisesFisher {
+            weight: self.weight,
+            direction: DVector::from_vec(self.direction),
+            concentration: self.concentration,
+        }
+    }
 }
 
 impl RawComponent {
@@ -296,6 +337,25 @@ fn write_node(model: &Model, node: &Node) -> String {
             out.value("states", &cpd.states);
             out.value("parents", &name_all(&cpd.parents));
             out.value("table", &cpd.table);
+        }
+        Cpd::VonMisesFisher(cpd) => {
+            out.text("kind", "von_mises_fisher_mixture");
+            out.value("columns", &cpd.columns);
+            out.value("discrete_parents", &name_all(&cpd.discrete_parents));
+            let rows: Vec<Vec<RawDirection>> = cpd
+                .components
+                .iter()
+                .map(|row| {
+                    row.iter()
+                        .map(|c| RawDirection {
+                            weight: c.weight,
+                            direction: c.direction.iter().copied().collect(),
+                            concentration: c.concentration,
+                        })
+                        .collect()
+                })
+                .collect();
+            out.value("components", &rows);
         }
         Cpd::Mixture(cpd) => {
             out.text("kind", "gaussian_mixture");

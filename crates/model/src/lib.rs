@@ -66,20 +66,28 @@ mod gaussian;
 mod root_gaussian;
 mod sphere;
 
+mod bessel;
+mod direction_answer;
+mod von_mises_fisher;
+mod von_mises_fisher_fit;
+mod von_mises_fisher_train;
+
 pub use answer::{Answer, Target};
 pub use batch::{BatchQuery, RowAnswer};
 pub use cell::{CellReport, OrderScore};
 pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
+pub use direction_answer::DirectionAnswer;
 pub use error::ModelError;
 pub use evidence::{Evidence, Observation};
 pub use explain::{Contrast, Explanation, MostProbable, ProbableValue};
 pub use interchange::Export;
 pub use mixture::{Mixture, Term};
 pub use model::{Model, Node};
-pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec};
+pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, VonMisesFisherSpec};
 pub use structure::{
     LearnedArc, LearnedStructure, StructureOptions, StructureRules, StructureScore, learn_structure,
     score_structure,
 };
 pub use table::{Column, Table};
 pub use train::{NodeReport, TrainOptions, TrainReport, Trained, train};
+pub use von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};

@@ -8,9 +8,13 @@ use serde_json::{Map, Value};
 use crate::cpd::{Cpd, MixtureCpd, NodeIdx};
 use crate::double_double::{Root, covariance_root};
 use crate::error::{ModelError, list};
+use crate::von_mises_fisher::{MAX_CONCENTRATION, VonMisesFisherCpd};
 
 /// Rows of tables and of mixture weights sum to 1 within this: what six printed digits of each entry allow.
 const SUM_TOLERANCE: f64 = 1e-5;
+/// Why a direction is nobody's continuous parent, and what to do.
+pub(crate) const NO_DIRECTION_PARENT: &str =
+    "is a von_mises_fisher_mixture, which is no continuous parent; make it a gaussian_mixture with `sphere`";
 /// Asymmetry and negative eigenvalues of a covariance up to this share of its largest entry are rounding.
 const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
@@ -76,6 +80,10 @@ impl Model {
                     Vec::new()
                 }
                 Cpd::Mixture(cpd) => check_mixture(node, cpd, &nodes)?,
+                Cpd::VonMisesFisher(cpd) => {
+                    check_directions(node, cpd, &nodes)?;
+                    Vec::new()
+                }
             });
         }
         Ok(Self {
@@ -149,7 +157,7 @@ impl Model {
     pub(crate) fn mixture(&self, idx: NodeIdx) -> Option<&MixtureCpd> {
         match &self.nodes[idx.0].cpd {
             Cpd::Mixture(cpd) => Some(cpd),
-            Cpd::Discrete(_) => None,
+            Cpd::Discrete(_) | Cpd::VonMisesFisher(_) => None,
         }
     }
 
@@ -157,7 +165,7 @@ impl Model {
     pub(crate) fn n_states(&self, idx: NodeIdx) -> usize {
         match &self.nodes[idx.0].cpd {
             Cpd::Discrete(cpd) => cpd.states.len(),
-            Cpd::Mixture(_) => 0,
+            Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => 0,
         }
     }
 
@@ -211,6 +219,7 @@ impl Model {
             .map(|node| match &node.cpd {
                 Cpd::Discrete(cpd) => cpd.n_parameters(),
                 Cpd::Mixture(cpd) => cpd.n_parameters(),
+                Cpd::VonMisesFisher(cpd) => cpd.n_parameters(),
             })
             .sum()
     }
@@ -221,6 +230,7 @@ impl Node {
     pub fn parents(&self) -> Vec<NodeIdx> {
         match &self.cpd {
             Cpd::Discrete(cpd) => cpd.parents.clone(),
+            Cpd::VonMisesFisher(cpd) => cpd.discrete_parents.clone(),
             Cpd::Mixture(cpd) => [&cpd.discrete_parents[..], &cpd.continuous_parents[..]].concat(),
         }
     }
@@ -230,13 +240,14 @@ impl Node {
         match &self.cpd {
             Cpd::Discrete(cpd) => &cpd.parents,
             Cpd::Mixture(cpd) => &cpd.discrete_parents,
+            Cpd::VonMisesFisher(cpd) => &cpd.discrete_parents,
         }
     }
 
     /// The parents whose values enter the regressions.
     pub fn continuous_parents(&self) -> &[NodeIdx] {
         match &self.cpd {
-            Cpd::Discrete(_) => &[],
+            Cpd::Discrete(_) | Cpd::VonMisesFisher(_) => &[],
             Cpd::Mixture(cpd) => &cpd.continuous_parents,
         }
     }
@@ -246,6 +257,7 @@ impl Node {
         match &self.cpd {
             Cpd::Discrete(_) => vec![self.name.clone()],
             Cpd::Mixture(cpd) => cpd.columns.clone(),
+            Cpd::VonMisesFisher(cpd) => cpd.columns.clone(),
         }
     }
 
@@ -253,7 +265,7 @@ impl Node {
     pub fn states(&self) -> &[String] {
         match &self.cpd {
             Cpd::Discrete(cpd) => &cpd.states,
-            Cpd::Mixture(_) => &[],
+            Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => &[],
         }
     }
 }
@@ -316,11 +328,19 @@ fn n_configurations(node: &Node, nodes: &[Node]) -> Result<usize, ModelError> {
         let parent = &nodes[parent.0];
         match &parent.cpd {
             Cpd::Discrete(cpd) => product = product.saturating_mul(cpd.states.len()),
-            Cpd::Mixture(_) => {
+            Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => {
                 return Err(match &node.cpd {
                     Cpd::Discrete(_) => ModelError::ContinuousParent {
                         node: node.name.clone(),
                         parent: parent.name.clone(),
+                    },
+                    Cpd::VonMisesFisher(_) => ModelError::ModelFile {
+                        place: format!("node `{}`", node.name),
+                        problem: format!(
+                            "`{}` stands in discrete_parents but is continuous; a von_mises_fisher_mixture has discrete \
+                             parents only, a gaussian_mixture with `sphere` takes both",
+                            parent.name
+                        ),
                     },
                     Cpd::Mixture(_) => ModelError::ModelFile {
                         place: format!("node `{}`", node.name),
@@ -383,6 +403,12 @@ fn check_mixture(node: &Node, cpd: &MixtureCpd, nodes: &[Node]) -> Result<Vec<Ve
     for parent in &cpd.continuous_parents {
         match &nodes[parent.0].cpd {
             Cpd::Mixture(parent) => q += parent.dim(),
+            Cpd::VonMisesFisher(_) => {
+                return Err(ModelError::ModelFile {
+                    place: place(),
+                    problem: format!("`{}` {}", nodes[parent.0].name, NO_DIRECTION_PARENT),
+                });
+            }
             Cpd::Discrete(_) => {
                 return Err(ModelError::ModelFile {
                     place: place(),
@@ -449,6 +475,64 @@ fn check_mixture(node: &Node, cpd: &MixtureCpd, nodes: &[Node]) -> Result<Vec<Ve
         });
     }
     Ok(factors)
+}
+
+fn check_directions(node: &Node, cpd: &VonMisesFisherCpd, nodes: &[Node]) -> Result<(), ModelError> {
+    let n_rows = n_configurations(node, nodes)?;
+    let d = cpd.dim();
+    if d < 2 {
+        return Err(ModelError::ModelFile {
+            place: format!("node `{}`", node.name),
+            problem: format!("`columns` has {d} entries; a direction needs at least 2"),
+        });
+    }
+    if cpd.components.len() != n_rows {
+        return Err(ModelError::Length {
+            what: format!("`components` of `{}`", node.name),
+            found: cpd.components.len(),
+            expected: n_rows,
+        });
+    }
+    for (configuration, row) in cpd.components.iter().enumerate() {
+        let bad = |component: usize, problem: String| ModelError::BadComponent {
+            node: node.name.clone(),
+            configuration,
+            component,
+            problem,
+        };
+        for (k, component) in row.iter().enumerate() {
+            if !(component.weight >= 0.0 && component.weight.is_finite()) {
+                let problem = format!(
+                    "the weight is {}; expected a number of at least 0",
+                    component.weight
+                );
+                return Err(bad(k, problem));
+            }
+            if component.direction.len() != d
+                || (component.direction.norm() - 1.0).abs() > SUM_TOLERANCE
+                || component.direction.iter().any(|v| !v.is_finite())
+            {
+                let problem = format!(
+                    "`direction` is {:?}; expected a unit vector of {d} numbers",
+                    component.direction.as_slice()
+                );
+                return Err(bad(k, problem));
+            }
+            if !(0.0..=MAX_CONCENTRATION).contains(&component.concentration) {
+                let problem = format!(
+                    "`concentration` is {}; expected a number from 0 to {MAX_CONCENTRATION}",
+                    component.concentration
+                );
+                return Err(bad(k, problem));
+            }
+        }
+        let sum: f64 = row.iter().map(|component| component.weight).sum();
+        if row.is_empty() || (sum - 1.0).abs() > SUM_TOLERANCE {
+            let problem = format!("the weights of this row sum to {sum}; expected 1");
+            return Err(bad(row.len().saturating_sub(1), problem));
+        }
+    }
+    Ok(())
 }
 
 fn check_component(component: &crate::cpd::Component, d: usize, q: usize) -> Result<Root, String> {

@@ -41,6 +41,8 @@ pub enum NodeKind {
     },
     /// A vector with a mixture of linear regressions per configuration of its discrete parents.
     Mixture(MixtureSpec),
+    /// A unit vector with a mixture of von Mises–Fisher distributions per configuration of its parents.
+    VonMisesFisher(VonMisesFisherSpec),
 }
 
 /// Settings of a continuous node.
@@ -58,6 +60,17 @@ pub struct MixtureSpec {
     pub sign: Sign,
     /// Whether the values are unit vectors.
     pub sphere: bool,
+}
+
+/// Settings of a node of unit vectors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VonMisesFisherSpec {
+    /// Column of each coordinate, at least two.
+    pub columns: Vec<String>,
+    /// How many components; without a guard.
+    pub order: MixtureOrder,
+    /// Smallest spread in radians: no concentration is above its inverse square.
+    pub noise_floor: f64,
 }
 
 /// How many components a mixture gets.
@@ -106,6 +119,7 @@ struct RawNode {
 enum Kind {
     Discrete,
     GaussianMixture,
+    VonMisesFisherMixture,
 }
 
 #[derive(Deserialize)]
@@ -247,6 +261,7 @@ impl NodeSpec {
         match &self.kind {
             NodeKind::Discrete { .. } => vec![self.name.clone()],
             NodeKind::Mixture(spec) => spec.columns.clone(),
+            NodeKind::VonMisesFisher(spec) => spec.columns.clone(),
         }
     }
 }
@@ -265,7 +280,20 @@ impl RawNode {
             if parents.contains(&position) {
                 return Err(self.bad("parents", &format!("`{parent}` twice"), "each parent once"));
             }
-            if self.kind == Kind::Discrete && kinds[position] == Kind::GaussianMixture {
+            if self.kind != Kind::Discrete && kinds[position] == Kind::VonMisesFisherMixture {
+                let found = format!("`{parent}`, a von_mises_fisher_mixture");
+                return Err(self.bad(
+                    "parents",
+                    &found,
+                    "discrete nodes and gaussian mixtures; make it a gaussian_mixture with `sphere = true`",
+                ));
+            }
+            if self.kind == Kind::VonMisesFisherMixture && kinds[position] != Kind::Discrete {
+                let expected =
+                    "discrete parents only; a gaussian_mixture with `sphere = true` takes continuous ones";
+                return Err(self.bad("parents", &format!("`{parent}`, a continuous node"), expected));
+            }
+            if self.kind == Kind::Discrete && kinds[position] != Kind::Discrete {
                 return Err(ModelError::ContinuousParent {
                     node: self.name.clone(),
                     parent: parent.clone(),
@@ -276,6 +304,7 @@ impl RawNode {
         let kind = match self.kind {
             Kind::Discrete => self.discrete()?,
             Kind::GaussianMixture => NodeKind::Mixture(self.mixture_spec()?),
+            Kind::VonMisesFisherMixture => NodeKind::VonMisesFisher(self.direction_spec()?),
         };
         Ok(NodeSpec {
             name: self.name,
@@ -350,6 +379,49 @@ impl RawNode {
             noise_floor,
             sign,
             sphere,
+        })
+    }
+
+    fn direction_spec(&self) -> Result<VonMisesFisherSpec, ModelError> {
+        let foreign = [
+            ("states", self.states.is_some()),
+            ("prior", self.prior.is_some()),
+            ("weights", self.weights.is_some()),
+            ("sign", self.sign.is_some()),
+            ("sphere", self.sphere.is_some()),
+        ];
+        if let Some((key, _)) = foreign.iter().find(|(_, given)| *given) {
+            return Err(self.bad(key, "given", "no such key in a von_mises_fisher_mixture"));
+        }
+        let columns = self.columns.clone().unwrap_or_default();
+        if columns.len() < 2 {
+            let found = format!("{} columns", columns.len());
+            return Err(self.bad(
+                "columns",
+                &found,
+                "one per coordinate of the unit vector, at least two",
+            ));
+        }
+        let noise_floor = match &self.noise_floor {
+            None => 0.0,
+            Some(Floor::One(floor)) if *floor >= 0.0 && floor.is_finite() => *floor,
+            Some(_) => {
+                return Err(self.bad(
+                    "noise_floor",
+                    "no such number",
+                    "one angle in radians, at least 0",
+                ));
+            }
+        };
+        let order = self.mixture_order()?;
+        if let MixtureOrder::Bic { guard: true, .. } = order {
+            let expected = "\"bic\" or a fixed number of components for a von_mises_fisher_mixture";
+            return Err(self.bad("mixture", "chosen by \"bic+cv\"", expected));
+        }
+        Ok(VonMisesFisherSpec {
+            columns,
+            order,
+            noise_floor,
         })
     }
 

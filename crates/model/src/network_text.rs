@@ -24,6 +24,22 @@ impl Network {
                     put(&mut out, "states", &array(states.iter().map(|state| text(state))));
                     put(&mut out, "prior", &Value::from(*prior).to_string());
                 }
+                NodeKind::VonMisesFisher(spec) => {
+                    put(&mut out, "kind", "\"von_mises_fisher_mixture\"");
+                    put(
+                        &mut out,
+                        "columns",
+                        &array(spec.columns.iter().map(|column| text(column))),
+                    );
+                    put(&mut out, "mixture", &order(spec.order));
+                    if spec.noise_floor > 0.0 {
+                        put(
+                            &mut out,
+                            "noise_floor",
+                            &Value::from(spec.noise_floor).to_string(),
+                        );
+                    }
+                }
                 NodeKind::Mixture(spec) => {
                     put(&mut out, "kind", "\"gaussian_mixture\"");
                     mixture(&mut out, spec);
@@ -68,14 +84,7 @@ fn mixture(out: &mut String, spec: &MixtureSpec) {
         "columns",
         &array(spec.columns.iter().map(|column| text(column))),
     );
-    let order = match spec.order {
-        MixtureOrder::Fixed(k) => format!("{{ components = {k} }}"),
-        MixtureOrder::Bic { max, guard } => {
-            let choose = if guard { "bic+cv" } else { "bic" };
-            format!("{{ max = {max}, choose = \"{choose}\" }}")
-        }
-    };
-    put(out, "mixture", &order);
+    put(out, "mixture", &order(spec.order));
     match spec.weights {
         Weights::PerConfiguration => {}
         Weights::Shared => put(out, "weights", "\"shared\""),
@@ -93,6 +102,16 @@ fn mixture(out: &mut String, spec: &MixtureSpec) {
     }
     if spec.sphere {
         put(out, "sphere", "true");
+    }
+}
+
+fn order(order: MixtureOrder) -> String {
+    match order {
+        MixtureOrder::Fixed(k) => format!("{{ components = {k} }}"),
+        MixtureOrder::Bic { max, guard } => {
+            let choose = if guard { "bic+cv" } else { "bic" };
+            format!("{{ max = {max}, choose = \"{choose}\" }}")
+        }
     }
 }
 
@@ -141,12 +160,19 @@ mod tests {
             parents = ["size"]
             mixture = { max = 5, choose = "bic+cv" }
             sign = "latent"
-            sphere = true"#,
+            sphere = true
+            [[node]]
+            name = "upos"
+            kind = "von_mises_fisher_mixture"
+            columns = ["p", "q", "r"]
+            noise_floor = 0.01"#,
         )
         .unwrap();
         let written = network.to_toml();
         assert_eq!(Network::from_toml(&written).unwrap(), network, "{written}");
-        let fewer = network.with_parents(&[vec![], vec![], vec![0, 1]]).unwrap();
+        let fewer = network
+            .with_parents(&[vec![], vec![], vec![0, 1], vec![0]])
+            .unwrap();
         assert_eq!(Network::from_toml(&fewer.to_toml()).unwrap(), fewer);
     }
 }

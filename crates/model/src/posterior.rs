@@ -50,6 +50,13 @@ impl Model {
                     expected: "each target once".into(),
                 });
             }
+            if let Cpd::VonMisesFisher(_) = self.node(idx).cpd {
+                return Err(ModelError::BadValue {
+                    node: (*target).into(),
+                    found: "a von_mises_fisher_mixture as one of the targets".into(),
+                    expected: "to be asked about alone, by `direction_posterior`".into(),
+                });
+            }
             asked.push(idx);
         }
         let elimination = Elimination::new(self, &asked, evidence, Latent::Summed);
@@ -255,6 +262,12 @@ fn arrange(query: &Elimination, mut terms: Vec<Term>, log_evidence: f64, error_b
             Cpd::Discrete(cpd) => Target::Discrete {
                 name: node.name.clone(),
                 states: cpd.states.clone(),
+            },
+            // Refused before: it is asked about alone.
+            Cpd::VonMisesFisher(cpd) => Target::Continuous {
+                name: node.name.clone(),
+                columns: cpd.columns.clone(),
+                sphere: true,
             },
             Cpd::Mixture(cpd) => {
                 places.extend((0..cpd.dim()).map(|d| match start.get(&idx) {

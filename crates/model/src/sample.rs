@@ -20,6 +20,7 @@ impl Model {
                 let configuration = self.configuration(idx, &row_states);
                 match &self.node(idx).cpd {
                     Cpd::Discrete(cpd) => row_states[idx.0] = cpd.sample(configuration, &mut rng),
+                    Cpd::VonMisesFisher(cpd) => row_values[idx.0] = cpd.sample(configuration, &mut rng),
                     Cpd::Mixture(cpd) => {
                         let parents: Vec<f64> = cpd
                             .continuous_parents
@@ -42,8 +43,8 @@ impl Model {
                     let texts = states[i].iter().map(|&state| cpd.states[state].clone()).collect();
                     columns.push((node.name.clone(), Column::Text(texts)));
                 }
-                Cpd::Mixture(cpd) => {
-                    for (d, column) in cpd.columns.iter().enumerate() {
+                Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => {
+                    for (d, column) in node.columns().iter().enumerate() {
                         let numbers = values[i].iter().map(|value| value[d]).collect();
                         columns.push((column.clone(), Column::Numbers(numbers)));
                     }

@@ -16,6 +16,7 @@ use crate::family::Family;
 use crate::model::{Model, Node};
 use crate::network::{MixtureSpec, Network, NodeKind, NodeSpec};
 use crate::table::Table;
+use crate::von_mises_fisher_train::train_directions;
 
 /// Settings of [`train`]. The paper gives none of them.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +118,7 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
             .filter(|(task, _)| task.node == i)
             .map(|(_, cell)| cell)
             .collect();
-        let report = NodeReport {
+        let mut report = NodeReport {
             name: node.name.clone(),
             n_rows: family.rows.len(),
             cells: name_cells(network, node, &cells),
@@ -139,6 +140,13 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
                 Cpd::Discrete(count(network, node, states, *prior, family, &mut warnings))
             }
             NodeKind::Mixture(spec) => Cpd::Mixture(assemble(network, node, spec, family, &cells)),
+            NodeKind::VonMisesFisher(spec) => {
+                let trained = train_directions(network, node, spec, table, &weights, options)?;
+                report.n_rows = trained.n_rows;
+                report.cells = trained.cells;
+                warnings.extend(trained.warnings);
+                Cpd::VonMisesFisher(trained.cpd)
+            }
         };
         let mut extra = Map::new();
         extra.insert(
@@ -299,7 +307,7 @@ fn name_cells(network: &Network, node: &NodeSpec, cells: &[&FittedCell]) -> Vec<
             NodeKind::Discrete { states, .. } => {
                 Some((network.nodes()[parent].name.as_str(), states.as_slice()))
             }
-            NodeKind::Mixture(_) => None,
+            NodeKind::Mixture(_) | NodeKind::VonMisesFisher(_) => None,
         })
         .collect();
     cells

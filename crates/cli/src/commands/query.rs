@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use prehend::frame::Frame;
-use prehend::model::{Evidence, Model, ModelError};
+use prehend::model::{Cpd, Evidence, Model, ModelError};
 use prehend::training::to_table;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -158,7 +158,12 @@ impl Arguments {
             json!({ "log_evidence": model.log_evidence(evidence)? })
         } else {
             let names: Vec<&str> = targets.iter().map(String::as_str).collect();
-            model.posterior(&names, evidence)?.to_json_at(at)?
+            match names[..] {
+                [name] if matches!(model.node(model.index(name)?).cpd, Cpd::VonMisesFisher(_)) => {
+                    model.direction_posterior(name, evidence)?.to_json_at(at)?
+                }
+                _ => model.posterior(&names, evidence)?.to_json_at(at)?,
+            }
         };
         if self.explain {
             let [target] = targets else {

@@ -12,6 +12,10 @@ impl Model {
         for node in self.nodes() {
             let (shape, note) = match &node.cpd {
                 Cpd::Discrete(cpd) => ("box", format!("{} states", cpd.states.len())),
+                Cpd::VonMisesFisher(cpd) => {
+                    let k = cpd.components.iter().map(Vec::len).max().unwrap_or(0);
+                    ("ellipse", format!("direction, dim {}, {k} comp.", cpd.dim()))
+                }
                 Cpd::Mixture(cpd) => {
                     let k = cpd.components.iter().map(Vec::len).max().unwrap_or(0);
                     ("ellipse", format!("dim {}, {k} comp.", cpd.dim()))

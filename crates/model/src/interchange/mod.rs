@@ -154,7 +154,9 @@ impl Model {
         for (i, node) in self.nodes().iter().enumerate() {
             match &node.cpd {
                 Cpd::Discrete(cpd) => kept.push((NodeIdx(i), cpd)),
-                Cpd::Mixture(_) => losses.push(format!("`{}` is continuous and left out", node.name)),
+                Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => {
+                    losses.push(format!("`{}` is continuous and left out", node.name));
+                }
             }
         }
         if kept.is_empty() {

@@ -87,6 +87,17 @@ impl Model {
     ///
     /// [`ModelError::Export`] where two names become one.
     pub fn to_net(&self) -> Result<Export, ModelError> {
+        let is_direction = |node: &&Node| matches!(node.cpd, Cpd::VonMisesFisher(_));
+        if let Some(node) = self.nodes().iter().find(is_direction) {
+            return Err(ModelError::Export {
+                format: STYLE.format.into(),
+                problem: format!(
+                    "`{}` is a von_mises_fisher_mixture, which it cannot hold; write .json or .bin, or train it as a \
+                     gaussian_mixture",
+                    node.name
+                ),
+            });
+        }
         let (model, mut losses) = self.in_scalars().map_err(|e| ModelError::Export {
             format: STYLE.format.into(),
             problem: format!("{e}; rename a column or a node"),
@@ -109,7 +120,7 @@ impl Model {
                         states.join(" ")
                     );
                 }
-                Cpd::Mixture(_) => {
+                Cpd::Mixture(_) | Cpd::VonMisesFisher(_) => {
                     text += &format!("continuous node {name}\n{{\n  label = \"{label}\";\n}}\n\n");
                 }
             }
@@ -141,6 +152,8 @@ impl Model {
                         )
                     })
                     .collect(),
+                // Refused above.
+                Cpd::VonMisesFisher(_) => Vec::new(),
                 Cpd::Mixture(cpd) => {
                     let of: Vec<&str> = cpd
                         .continuous_parents

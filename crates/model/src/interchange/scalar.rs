@@ -34,6 +34,8 @@ impl Model {
                     places[idx.0] = vec![NodeIdx(nodes.len())];
                     nodes.push(plain(&node.name, Cpd::Discrete(cpd)));
                 }
+                // The writers refuse such models before.
+                Cpd::VonMisesFisher(_) => {}
                 Cpd::Mixture(cpd) => {
                     let mut discrete = moved(&cpd.discrete_parents);
                     let continuous = moved(&cpd.continuous_parents);

@@ -16,9 +16,12 @@ use crate::cpd::{Sign, Weights, n_mixture_parameters};
 use crate::em::{CovariancePrior, Mixing, RIDGE, Rows, row_log_densities};
 use crate::error::ModelError;
 use crate::family::Family;
-use crate::network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec};
+use crate::network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, VonMisesFisherSpec};
 use crate::start::{FitOptions, fit_mixture};
 use crate::table::Table;
+use crate::von_mises_fisher::n_direction_parameters;
+use crate::von_mises_fisher_fit::Directions;
+use crate::von_mises_fisher_train::{direction_options, read_directions};
 
 /// EM steps after which a further component must have paid half its price, or is given up.
 const TRIAL_STEPS: usize = 12;
@@ -86,6 +89,11 @@ enum Values {
         /// Σ log of the columns' units: the density's change from standardised units to the columns' own.
         log_unit: f64,
     },
+    Direction {
+        /// Unit vectors, one per row.
+        x: Vec<Vec<f64>>,
+        spec: VonMisesFisherSpec,
+    },
 }
 
 impl Scorer {
@@ -101,19 +109,34 @@ impl Scorer {
         let weights = vec![1.0; n];
         let mut nodes = Vec::with_capacity(network.nodes().len());
         for node in network.nodes() {
+            let mut share = 1.0;
             let alone = NodeSpec {
                 parents: Vec::new(),
                 ..node.clone()
             };
-            let family = Family::read(network, &alone, table, &weights, None)?;
-            let mut share = 1.0;
+            let family = || Family::read(network, &alone, table, &weights, None);
             let values = match &node.kind {
                 NodeKind::Discrete { states, prior } => Values::Discrete {
-                    states: family.states,
+                    states: family()?.states,
                     n_states: states.len(),
                     prior: *prior,
                 },
+                NodeKind::VonMisesFisher(spec) => {
+                    // Rows are complete.
+                    let x: Vec<Vec<f64>> = read_directions(spec, &node.name, table)?
+                        .into_iter()
+                        .flatten()
+                        .collect();
+                    if let Some(groups) = groups {
+                        share = share_of_constant(&x, groups);
+                    }
+                    Values::Direction {
+                        x,
+                        spec: spec.clone(),
+                    }
+                }
                 NodeKind::Mixture(spec) => {
+                    let family = family()?;
                     if let Some(groups) = groups {
                         share = share_of_constant(&family.y, groups);
                     }
@@ -155,7 +178,7 @@ impl Scorer {
             .iter()
             .filter_map(|&parent| match &self.nodes[parent].values {
                 Values::Continuous { y, .. } => Some(y),
-                Values::Discrete { .. } => None,
+                Values::Discrete { .. } | Values::Direction { .. } => None,
             })
             .collect();
         let members = Members {
@@ -170,6 +193,7 @@ impl Scorer {
                 n_states,
                 prior,
             } => self.score_table(&members, states, *n_states, *prior),
+            Values::Direction { x, spec } => self.score_directions(&members, x, spec, node, parents),
             Values::Continuous {
                 y,
                 spec,
@@ -244,6 +268,68 @@ impl Scorer {
                                 .sum::<f64>()
                         })
                         .sum::<f64>()
+                })
+                .sum(),
+        }
+    }
+}
+
+impl Scorer {
+    /// Directions: a mixture per configuration, on the sphere.
+    fn score_directions(
+        &self,
+        members: &Members,
+        x: &[Vec<f64>],
+        spec: &VonMisesFisherSpec,
+        node: usize,
+        parents: &[usize],
+    ) -> f64 {
+        let d = spec.columns.len();
+        let options = direction_options(spec, self.restarts, self.max_steps, 1e-5);
+        let log_n = members.log_n();
+        let gather = |keep: &dyn Fn(usize) -> bool| {
+            let kept: Vec<usize> = (0..members.rows.len()).filter(|&i| keep(i)).collect();
+            Directions {
+                d,
+                x: kept.iter().map(|&i| x[members.rows[i]].clone()).collect(),
+                weights: kept.iter().map(|&i| members.weights[i]).collect(),
+            }
+        };
+        // Rows learned from, rows scored, and what a parameter costs.
+        let part = |known: &dyn Fn(usize) -> bool, scored: &dyn Fn(usize) -> bool, cost: f64| -> f64 {
+            (0..members.n_configurations)
+                .map(|cell| {
+                    let own = |i: usize| members.configurations[i] == cell;
+                    let mut rows = gather(&|i| own(i) && known(i));
+                    let pooled = members.n_configurations > 1 && rows.total() < (d + 1) as f64;
+                    if pooled {
+                        rows = gather(known);
+                    }
+                    let seed = mixed(mixed(self.seed, node, parents), cell, &[]);
+                    let fit = match spec.order {
+                        _ if pooled => rows.fit(1, options, seed),
+                        MixtureOrder::Fixed(k) => rows.fit(
+                            k.min((rows.total() / (d + 1) as f64) as usize).max(1),
+                            options,
+                            seed,
+                        ),
+                        MixtureOrder::Bic { max, .. } => {
+                            let (mut fits, best) =
+                                rows.fit_by_bic(max.min(self.max_components), options, seed);
+                            fits.swap_remove(best)
+                        }
+                    };
+                    let price = cost * n_direction_parameters(fit.components.len(), d) as f64;
+                    gather(&|i| own(i) && scored(i)).log_likelihood(&fit.components) - price
+                })
+                .sum()
+        };
+        match self.score {
+            StructureScore::Bic => part(&|_| true, &|_| true, 0.5 * log_n),
+            StructureScore::CrossValidated { folds } => (0..folds)
+                .map(|fold| {
+                    let held = |i: usize| self.folds[members.rows[i]] == fold;
+                    part(&|i| !held(i), &held, 0.0)
                 })
                 .sum(),
         }

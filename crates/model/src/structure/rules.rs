@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use crate::error::{ModelError, list};
 use crate::model::topological_order;
-use crate::network::Network;
+use crate::network::{Network, NodeKind};
 
 /// What the table `[structure]` of a network file says, by position of the nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -100,6 +100,10 @@ impl Legal {
         let why_not = |from: usize, to: usize| -> Option<&'static str> {
             if from == to {
                 Some("an arc needs two nodes")
+            } else if matches!(nodes[from].kind, NodeKind::VonMisesFisher(_)) {
+                Some("a von_mises_fisher_mixture has no children; make it a gaussian_mixture with `sphere`")
+            } else if matches!(nodes[to].kind, NodeKind::VonMisesFisher(_)) && !nodes[from].is_discrete() {
+                Some("a von_mises_fisher_mixture has discrete parents only")
             } else if nodes[to].is_discrete() && !nodes[from].is_discrete() {
                 Some("a discrete node has no continuous parent; turn the arc round")
             } else if matches!((tier_of[from], tier_of[to]), (Some(a), Some(b)) if a > b) {
