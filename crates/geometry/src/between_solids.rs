@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::closest;
 use crate::collider::{Collider, Core};
+use crate::core_distance::segment;
 use crate::parry_bridge::{self, Closest, ConvexBody};
-use crate::triangle_tree::segment;
 
 impl Collider {
     /// Distance to another solid placed in this one's frame by `self_from_other`; `None` where it is `cutoff` or more.

@@ -1,120 +1,172 @@
-//! Distances to a surface on a regular grid: a cheap lower bound anywhere.
+//! Signed distances to a surface on a grid: coarse everywhere around it, fine in a narrow band.
+//!
+//! ```text
+//! ┌───────┬───────┬───────┐   Coarse nodes (●) every 4 h hold the distance anywhere near the object. A coarse cell that the
+//! │       │ ┼┼┼┼┼ │       │   surface comes near has a brick of 5 × 5 × 5 fine nodes, h apart, which hold it up to
+//! ●───────●───────●───────●   BAND + √3 h from the surface: a point within BAND lies between eight of them.
+//! │ ┼┼┼┼┼ │ ┼┼┼┼┼ │ ┼┼┼┼┼ │
+//! │~~~~~~~│~~~~~~~│~~~~~~~│   Between nodes distances are trilinear.
+//! ```
+//!
+//! **Error.** A distance changes by at most the length of a step, so the mean of eight nodes' distances with trilinear
+//! weights wᵢ is off by at most Σ wᵢ |x − xᵢ| ≤ √(Σ wᵢ |x − xᵢ|²) = h √(Σₖ tₖ (1 − tₖ)), tₖ the place in the cell along
+//! each axis: nothing at a node, at most √3/2 h in a cell's middle.
+//!
+//! **Sign.** Where a surface has holes the sign jumps without a surface between. Coarse cells where it does, and their
+//! neighbours, are marked as torn and give no estimate.
 
 use nalgebra::{Point3, Vector3};
 
-use crate::triangle_tree::TriangleTree;
+/// Fine cells along a coarse one.
+pub(crate) const N_FINE: usize = 4;
+/// Fine nodes along a brick.
+pub(crate) const N_ACROSS: usize = N_FINE + 1;
+/// Fine nodes of a brick.
+pub(crate) const N_BRICK: usize = N_ACROSS * N_ACROSS * N_ACROSS;
+/// The fine band reaches this many spacings to either side of the surface.
+pub(crate) const BAND: f64 = 2.0;
 
-/// Distances (m) at the nodes of a regular grid around a surface.
+/// Signed distances (m) at the nodes of a coarse grid and of fine bricks.
 #[derive(Debug, Clone)]
 pub(crate) struct DistanceGrid {
-    low: Point3<f64>,
-    spacing: f64,
-    counts: [usize; 3],
-    /// Rounded down to f32, so that they stay lower bounds.
-    distances: Vec<f32>,
-    surface_low: Point3<f64>,
-    surface_high: Point3<f64>,
+    pub(crate) low: Point3<f64>,
+    /// Of fine nodes, metres; coarse ones are [`N_FINE`] times as far apart.
+    pub(crate) spacing: f64,
+    /// Coarse cells along each axis.
+    pub(crate) counts: [usize; 3],
+    /// At coarse nodes, x fastest.
+    pub(crate) coarse: Vec<f32>,
+    /// For each coarse cell its brick's index plus 1; 0 without one. [`TORN`] is set where there is no estimate.
+    pub(crate) cells: Vec<u32>,
+    /// [`N_BRICK`] distances a brick; infinite beyond the band.
+    pub(crate) fine: Vec<f32>,
+    pub(crate) surface_low: Point3<f64>,
+    pub(crate) surface_high: Point3<f64>,
 }
 
-/// About this many nodes along the longest side.
-const N_LONGEST: f64 = 48.0;
-/// The grid reaches this much of its surface's longest side beyond it.
-const MARGIN: f64 = 0.2;
+/// Set in [`DistanceGrid::cells`] where the sign jumps nearby.
+pub(crate) const TORN: u32 = 1 << 31;
+/// What rounding to f32 may cost, relative.
+const ROUNDING: f64 = 6e-8;
+
+/// Distances at the corners of the cell around a point (bit k of the index: upper along axis k), the point's place in it
+/// (0 to 1 along each axis) and its size.
+struct Cell {
+    corners: [f64; 8],
+    place: Vector3<f64>,
+    size: f64,
+}
 
 impl DistanceGrid {
-    /// Measures the distances. Neighbouring nodes start from each other's bound, so that each costs a few triangles.
-    pub(crate) fn new(tree: &TriangleTree, low: Point3<f64>, high: Point3<f64>) -> Self {
-        let longest = (high - low).max().max(1e-9);
-        let margin = Vector3::repeat(longest * MARGIN);
-        let spacing = longest * (1.0 + 2.0 * MARGIN) / N_LONGEST;
-        let size = high - low + margin * 2.0;
-        let counts: [usize; 3] = size.map(|s| (s / spacing).ceil() as usize + 1).into();
-        let grid_low = low - margin;
-        let mut distances = Vec::with_capacity(counts.iter().product());
-        // Spacing plus a hair: the new distance is at most the neighbour's plus the step.
-        let step = spacing * (1.0 + 1e-9) + 1e-12;
-        let mut last = f64::INFINITY;
-        for k in 0..counts[2] {
-            for j in 0..counts[1] {
-                for i in 0..counts[0] {
-                    let p = grid_low + Vector3::new(i as f64, j as f64, k as f64) * spacing;
-                    let below = if i > 0 { last + step } else { f64::INFINITY };
-                    last = tree.nearest_point(&p, below).map_or(below, |(d, ..)| d);
-                    distances.push((last as f32).next_down());
-                }
-            }
-        }
-        Self {
-            low: grid_low,
-            spacing,
-            counts,
-            distances,
-            surface_low: low,
-            surface_high: high,
-        }
+    /// Spacing of the fine nodes, metres.
+    pub(crate) fn spacing(&self) -> f64 {
+        self.spacing
     }
 
-    /// A lower bound of the distance from `p` to the surface; 0 where nothing better is known.
+    /// Bytes on the heap.
+    pub(crate) fn n_bytes(&self) -> usize {
+        (self.coarse.len() + self.cells.len() + self.fine.len()) * size_of::<f32>()
+    }
+
+    /// The trilinear signed distance and a bound of its error; `None` outside the grid and where the sign jumps.
+    #[inline]
+    pub(crate) fn estimate(&self, p: &Point3<f64>) -> Option<(f64, f64)> {
+        let (coarse, idx, place) = self.locate(p)?;
+        if self.cells[idx] & TORN != 0 {
+            return None;
+        }
+        let Cell {
+            corners: d,
+            place: t,
+            size,
+        } = self.cell(coarse, idx, place);
+        let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+        let low = mix(mix(d[0], d[1], t.x), mix(d[2], d[3], t.x), t.y);
+        let high = mix(mix(d[4], d[5], t.x), mix(d[6], d[7], t.x), t.y);
+        let distance = mix(low, high, t.z);
+        let spread = t.component_mul(&(Vector3::repeat(1.0) - t)).sum();
+        let error = size * spread.max(0.0).sqrt() * (1.0 + 1e-12) + ROUNDING * (distance.abs() + size);
+        Some((distance, error))
+    }
+
+    /// A lower bound of the distance from `p` to the surface, on either side; 0 where nothing better is known.
     pub(crate) fn lower_bound(&self, p: &Point3<f64>) -> f64 {
-        let cell = (p - self.low) / self.spacing;
-        let inside = (0..3).all(|k| cell[k] >= 0.0 && cell[k] < (self.counts[k] - 1) as f64);
-        if !inside {
+        let Some((coarse, idx, place)) = self.locate(p) else {
             // The surface lies within its bounds.
             let nearest = p
                 .coords
                 .sup(&self.surface_low.coords)
                 .inf(&self.surface_high.coords);
             return (p.coords - nearest).norm();
-        }
-        let floor = cell.map(f64::floor);
-        let base = floor.map(|f| f as usize);
-        let fraction = cell - floor;
+        };
+        let cell = self.cell(coarse, idx, place);
         let mut bound = 0.0_f64;
-        for corner in 0..8 {
-            let bit = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
-            let at =
-                ((base.z + bit[2]) * self.counts[1] + base.y + bit[1]) * self.counts[0] + base.x + bit[0];
-            let offset = fraction - Vector3::from(bit.map(|b| b as f64));
-            bound = bound.max(f64::from(self.distances[at]) - offset.norm() * self.spacing);
+        for (i, d) in cell.corners.iter().enumerate() {
+            let corner = Vector3::new(i & 1, i >> 1 & 1, i >> 2 & 1).map(|b| b as f64);
+            bound = bound.max(d.abs() * (1.0 - ROUNDING) - (cell.place - corner).norm() * cell.size);
         }
         bound
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::TriMesh;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
+    /// Which side of the surface a point is on, where a node is nearer to it than to any surface.
+    pub(crate) fn side(&self, p: &Point3<f64>) -> Option<bool> {
+        let (coarse, idx, place) = self.locate(p)?;
+        if self.cells[idx] & TORN != 0 {
+            return None;
+        }
+        let cell = self.cell(coarse, idx, place);
+        (0..8).find_map(|i| {
+            let corner = Vector3::new(i & 1, i >> 1 & 1, i >> 2 & 1).map(|b| b as f64);
+            let apart = (cell.place - corner).norm() * cell.size;
+            (cell.corners[i].abs() * (1.0 - ROUNDING) > apart).then_some(cell.corners[i] < 0.0)
+        })
+    }
 
-    #[test]
-    fn the_bound_never_exceeds_the_distance_and_is_close_to_it_far_away() {
-        let corners = [
-            [0.0, 0.0, 0.0],
-            [0.2, 0.0, 0.01],
-            [0.0, 0.1, 0.0],
-            [0.05, 0.05, 0.15],
-        ]
-        .map(Point3::from);
-        let mesh = TriMesh::new(corners.to_vec(), vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).unwrap();
-        let tree = TriangleTree::new(&mesh);
-        let (low, high) = mesh.axis_aligned_bounds();
-        let grid = DistanceGrid::new(&tree, low, high);
-        let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let mut largest_loss = 0.0_f64;
-        for _ in 0..20_000 {
-            let p = Point3::from(Vector3::from_fn(|_, _| rng.random_range(-0.15..0.35)));
-            let exact = tree.nearest_point(&p, f64::INFINITY).unwrap().0;
-            let bound = grid.lower_bound(&p);
-            assert!(bound <= exact + 1e-12, "{p}: {bound} > {exact}");
-            if (0..3).all(|k| p[k] > -0.03 && p[k] < high[k] + 0.03) {
-                largest_loss = largest_loss.max(exact - bound);
+    /// The coarse cell of a point, its index in `cells`, and the point's place in it.
+    #[inline]
+    fn locate(&self, p: &Point3<f64>) -> Option<([usize; 3], usize, Vector3<f64>)> {
+        let at = (p - self.low) / (self.spacing * N_FINE as f64);
+        // Written so that NaN is outside.
+        if !(0..3).all(|k| at[k] >= 0.0 && at[k] < self.counts[k] as f64) {
+            return None;
+        }
+        let cell: [usize; 3] = at.map(|x| x as usize).into();
+        let idx = (cell[2] * self.counts[1] + cell[1]) * self.counts[0] + cell[0];
+        Some((cell, idx, at - Vector3::from(cell.map(|c| c as f64))))
+    }
+
+    /// The smallest cell around a point whose corners' distances are known.
+    #[inline]
+    fn cell(&self, coarse: [usize; 3], idx: usize, place: Vector3<f64>) -> Cell {
+        if let Some(brick) = (self.cells[idx] & !TORN).checked_sub(1) {
+            let at = place * N_FINE as f64;
+            let cell: [usize; 3] = at.map(|x| (x as usize).min(N_FINE - 1)).into();
+            let first = brick as usize * N_BRICK + (cell[2] * N_ACROSS + cell[1]) * N_ACROSS + cell[0];
+            let corners = corners(&self.fine, first, N_ACROSS, N_ACROSS * N_ACROSS);
+            if corners.iter().all(|d| d.is_finite()) {
+                let place = at - Vector3::from(cell.map(|c| c as f64));
+                return Cell {
+                    corners,
+                    place,
+                    size: self.spacing,
+                };
             }
         }
-        assert!(
-            largest_loss < 0.2 * 1.4 / 48.0 * 0.9,
-            "at most half a cell's diagonal: {largest_loss}"
-        );
+        let (row, slice) = (self.counts[0] + 1, (self.counts[0] + 1) * (self.counts[1] + 1));
+        let first = coarse[2] * slice + coarse[1] * row + coarse[0];
+        Cell {
+            corners: corners(&self.coarse, first, row, slice),
+            place,
+            size: self.spacing * N_FINE as f64,
+        }
     }
+}
+
+/// The values at a cell's corners.
+#[inline]
+pub(crate) fn corners(values: &[f32], first: usize, row: usize, slice: usize) -> [f64; 8] {
+    let pair = |at: usize| [f64::from(values[at]), f64::from(values[at + 1])];
+    let ([a, b], [c, d]) = (pair(first), pair(first + row));
+    let ([e, f], [g, h]) = (pair(first + slice), pair(first + slice + row));
+    [a, b, c, d, e, f, g, h]
 }

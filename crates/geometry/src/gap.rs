@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 
 use crate::collider::{Collider, Core};
-use crate::triangle_tree::{self, core_to_triangle};
+use crate::core_distance::{self, core_to_triangle};
 use crate::{Surface, closest};
 
 /// The closest points of a surface and a solid, in the surface's frame.
@@ -133,7 +133,7 @@ fn nearest_on_core(
     match &solid.core {
         Core::Point => Some(corners[0]),
         Core::Segment(half) => {
-            let [a, b] = triangle_tree::segment(surface_from_solid, *half);
+            let [a, b] = core_distance::segment(surface_from_solid, *half);
             Some(closest::on_segment(p, &a, &b))
         }
         Core::Mesh(tree) => {

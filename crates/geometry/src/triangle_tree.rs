@@ -1,28 +1,15 @@
-//! Triangles in a tree of bounds: the nearest one to a point, a solid or another tree.
+//! Triangles in a tree of bounds: the nearest one to a point, and the first one along a ray.
 
-use std::cell::Cell;
+use nalgebra::{Point3, Vector3};
+use parry3d_f64::partitioning::{Bvh, BvhNode};
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use parry3d_f64::partitioning::{Bvh, BvhNode, TraversalAction};
-
-use crate::collider::{Collider, Core};
-use crate::parry_bridge::{self, Closest};
-use crate::{TriMesh, closest};
+use crate::{TriMesh, closest, parry_bridge};
 
 /// Triangles and a tree of their bounds.
 #[derive(Debug, Clone)]
 pub(crate) struct TriangleTree {
-    triangles: Vec<[Point3<f64>; 3]>,
-    bvh: Bvh,
-}
-
-/// The closest points of a tree and a solid's core, both in the tree's frame; equal where they meet.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Nearest {
-    pub(crate) distance: f64,
-    pub(crate) on_tree: Point3<f64>,
-    pub(crate) on_core: Point3<f64>,
-    pub(crate) triangle: u32,
+    pub(crate) triangles: Vec<[Point3<f64>; 3]>,
+    pub(crate) bvh: Bvh,
 }
 
 impl TriangleTree {
@@ -65,222 +52,11 @@ impl TriangleTree {
         );
         found.map(|(i, t)| (t, i))
     }
-
-    /// The nearest triangle to a solid's core closer than `below`. Other triangles as near as it may be chosen.
-    pub(crate) fn nearest_core(
-        &self,
-        collider: &Collider,
-        tree_from_core: &Isometry3<f64>,
-        below: f64,
-    ) -> Option<Nearest> {
-        let placed = PlacedBounds::new(collider, tree_from_core);
-        // GJK is dear: a triangle beyond a plane that stands `best` off the core needs none.
-        let last_plane: Cell<Option<Plane>> = Cell::new(None);
-        let is_convex = matches!(collider.core, Core::Convex(_));
-        let found = self.bvh.find_best(
-            below,
-            |node, _| placed.distance(node),
-            |i, best| {
-                let triangle = &self.triangles[i as usize];
-                if is_convex {
-                    let beyond = last_plane
-                        .get()
-                        .is_some_and(|plane| plane.distance(triangle) >= best);
-                    if beyond || placed.distance_to_plane_of(triangle) >= best {
-                        return None;
-                    }
-                }
-                let pair = core_to_triangle(collider, tree_from_core, triangle, best)?;
-                let distance = (pair.0 - pair.1).norm();
-                if is_convex && distance < best {
-                    last_plane.set(Plane::at(&pair.0, &(pair.1 - pair.0)));
-                }
-                Some((distance, pair))
-            },
-        );
-        found.map(|(triangle, (distance, (on_core, on_tree)))| Nearest {
-            distance,
-            on_tree,
-            on_core,
-            triangle,
-        })
-    }
-
-    /// Calls `visit` with every triangle that may be closer to the core than `within` (some may be farther).
-    pub(crate) fn for_each_near(
-        &self,
-        collider: &Collider,
-        tree_from_core: &Isometry3<f64>,
-        within: f64,
-        mut visit: impl FnMut(u32),
-    ) {
-        let placed = PlacedBounds::new(collider, tree_from_core);
-        self.bvh.traverse(|node| {
-            if placed.distance(node) > within {
-                return TraversalAction::Prune;
-            }
-            if let Some(leaf) = node.leaf_data() {
-                visit(leaf);
-            }
-            TraversalAction::Continue
-        });
-    }
-}
-
-/// Closest points (core, triangle) in the triangle's frame; `None` only where a mesh core is not closer than `below`.
-pub(crate) fn core_to_triangle(
-    collider: &Collider,
-    tree_from_core: &Isometry3<f64>,
-    triangle: &[Point3<f64>; 3],
-    below: f64,
-) -> Option<(Point3<f64>, Point3<f64>)> {
-    match &collider.core {
-        Core::Point => {
-            let p = tree_from_core.translation.vector.into();
-            Some((p, closest::on_triangle(&p, triangle)))
-        }
-        Core::Segment(half) => {
-            let [p, q] = segment(tree_from_core, *half);
-            Some(closest::of_segment_and_triangle(&p, &q, triangle))
-        }
-        Core::Convex(body) => match parry_bridge::triangle_to_body(triangle, body, tree_from_core) {
-            Closest::Apart(on_triangle, on_core) => Some((on_core, on_triangle)),
-            Closest::Intersecting => Some((triangle[0], triangle[0])),
-            Closest::Unsettled => Some(by_features(collider, tree_from_core, triangle)),
-        },
-        Core::Mesh(tree) => {
-            let local = triangle.map(|p| tree_from_core.inverse_transform_point(&p));
-            let low = local[0].inf(&local[1]).inf(&local[2]);
-            let high = local[0].sup(&local[1]).sup(&local[2]);
-            let found = tree.bvh.find_best(
-                below,
-                |node, _| bounds_distance(node, &low, &high),
-                |i, _| {
-                    let pair = closest::of_triangles(&tree.triangles[i as usize], &local);
-                    Some(((pair.0 - pair.1).norm(), pair))
-                },
-            );
-            found.map(|(_, (_, (a, b)))| (tree_from_core * a, tree_from_core * b))
-        }
-    }
-}
-
-/// The end points of a capsule's core in the tree's frame.
-pub(crate) fn segment(tree_from_core: &Isometry3<f64>, half: f64) -> [Point3<f64>; 2] {
-    let along = tree_from_core.rotation * Vector3::new(0.0, 0.0, half);
-    let center = tree_from_core.translation.vector;
-    [(center - along).into(), (center + along).into()]
-}
-
-/// Closest points over the faces and edges of a polytope, the slow way; what GJK cannot settle ends here.
-fn by_features(
-    collider: &Collider,
-    tree_from_core: &Isometry3<f64>,
-    triangle: &[Point3<f64>; 3],
-) -> (Point3<f64>, Point3<f64>) {
-    let corner = |i: u32| tree_from_core * collider.corners[i as usize];
-    let faces = collider
-        .faces
-        .iter()
-        .map(|f| closest::of_triangles(&f.map(corner), triangle));
-    let edges = collider
-        .edges
-        .iter()
-        .map(|e| closest::of_segment_and_triangle(&corner(e[0]), &corner(e[1]), triangle));
-    let first = (corner(0), closest::on_triangle(&corner(0), triangle));
-    let distance = |pair: &(Point3<f64>, Point3<f64>)| (pair.0 - pair.1).norm_squared();
-    faces.chain(edges).fold(first, |best, pair| {
-        if distance(&pair) < distance(&best) {
-            pair
-        } else {
-            best
-        }
-    })
-}
-
-/// A plane that touches a convex core in its closest point to some triangle, its normal away from the core.
-#[derive(Clone, Copy)]
-struct Plane {
-    normal: Vector3<f64>,
-    height: f64,
-}
-
-impl Plane {
-    /// By the theorem of separating planes the core lies below it; a hair is added for rounding.
-    fn at(on_core: &Point3<f64>, towards_triangle: &Vector3<f64>) -> Option<Self> {
-        let normal = towards_triangle.try_normalize(1e-6)?;
-        Some(Self {
-            normal,
-            height: normal.dot(&on_core.coords) + 1e-9,
-        })
-    }
-
-    /// A lower bound of a triangle's distance from the core; may be negative.
-    fn distance(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-        let height = |p: &Point3<f64>| self.normal.dot(&p.coords);
-        height(a).min(height(b)).min(height(c)) - self.height
-    }
-}
-
-/// A core's bounds seen from a tree, and a tree's nodes seen from the core.
-struct PlacedBounds {
-    rotation: Matrix3<f64>,
-    abs_rotation: Matrix3<f64>,
-    center: Vector3<f64>,
-    half_in_tree: Vector3<f64>,
-    half: Vector3<f64>,
-}
-
-impl PlacedBounds {
-    fn new(collider: &Collider, tree_from_core: &Isometry3<f64>) -> Self {
-        let rotation = *tree_from_core.rotation.to_rotation_matrix().matrix();
-        let abs_rotation = rotation.abs();
-        Self {
-            rotation,
-            abs_rotation,
-            center: rotation * collider.core_center + tree_from_core.translation.vector,
-            half_in_tree: abs_rotation * collider.core_half,
-            half: collider.core_half,
-        }
-    }
-
-    /// A lower bound of the distance between the core and everything in the node.
-    fn distance(&self, node: &BvhNode) -> f64 {
-        let (center, half) = parry_bridge::node_bounds(node);
-        let (center, half) = (Vector3::from(center), Vector3::from(half));
-        let between = center - self.center;
-        let in_tree = (between.abs() - half - self.half_in_tree)
-            .sup(&Vector3::zeros())
-            .norm_squared();
-        let local = self.rotation.tr_mul(&between);
-        let in_core = (local.abs() - self.abs_rotation.tr_mul(&half) - self.half)
-            .sup(&Vector3::zeros())
-            .norm_squared();
-        in_tree.max(in_core).sqrt()
-    }
-
-    /// A lower bound of the distance between the core and the plane of a triangle; 0 for one without area.
-    fn distance_to_plane_of(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE) else {
-            return 0.0;
-        };
-        let reach = self.rotation.tr_mul(&normal).abs().dot(&self.half);
-        normal.dot(&(self.center - a.coords)).abs() - reach
-    }
 }
 
 fn node_distance(node: &BvhNode, p: &Point3<f64>) -> f64 {
     let (center, half) = parry_bridge::node_bounds(node);
     ((p.coords - Vector3::from(center)).abs() - Vector3::from(half))
-        .sup(&Vector3::zeros())
-        .norm()
-}
-
-fn bounds_distance(node: &BvhNode, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
-    let (center, half) = parry_bridge::node_bounds(node);
-    let middle = (low.coords + high.coords) / 2.0;
-    let reach = (high - low) / 2.0 + Vector3::from(half);
-    ((middle - Vector3::from(center)).abs() - reach)
         .sup(&Vector3::zeros())
         .norm()
 }
