@@ -78,7 +78,7 @@ mod write_ply;
 pub use box_record::BoxRecord;
 pub use collider::{Ball, Collider};
 pub use contact_point::ContactPoint;
-pub use decompose::{DecomposeOptions, Decomposition, TreeNode, decompose};
+pub use decompose::{DecomposeMethod, DecomposeOptions, Decomposition, TreeNode, decompose};
 pub use enclosure::largest_tetrahedron;
 pub use error::GeometryError;
 pub use gap::Gap;

@@ -66,6 +66,11 @@ impl Body {
         self.whole.clone()
     }
 
+    /// The whole in the body's own frame.
+    pub(super) fn thought(&self) -> &Region {
+        &self.whole.thought
+    }
+
     /// The two parts beside a plane of the body's own frame; either may be empty.
     pub(super) fn cut(&self, part: &Part, plane: &Plane) -> [Part; 2] {
         let [below, above] = part.thought.cut(plane, &self.whole.thought);

@@ -20,7 +20,7 @@ pub(super) struct Cut {
     /// Coordinate of the plane along it, from the box's centre.
     pub(super) position: f64,
     /// Share of the face's area that is freed, 1 − α.
-    freed: f64,
+    pub(super) freed: f64,
 }
 
 /// The promising cuts: of each image along each of its axes the one with the least α, where it sees a dent.

@@ -10,8 +10,8 @@ use crate::planar::planar_hull;
 /// those of all points.
 const SIMPLIFIED: f64 = 2e-3;
 /// Directions besides the given ones: normals of large facets, and spread evenly.
-const N_FACETS: usize = 12;
-const N_LATTICE: usize = 12;
+const N_FACETS: usize = 8;
+const N_LATTICE: usize = 6;
 /// Boxes that are measured again about their own axes.
 const N_STARTS: usize = 2;
 const MAX_ROUNDS: usize = 5;
@@ -52,6 +52,11 @@ impl Cloud {
             corners,
             facets: normals,
         }
+    }
+
+    /// The points that a box must hold, up to 1e-6 of their extent: corners of their hull.
+    pub(super) fn hull_corners(&self) -> Vec<Point3<f64>> {
+        hull_within(&self.points, 1e-6).points().to_vec()
     }
 
     /// The smaller of the boxes with one axis along one of `axes`; no extent is below `min_extent`.

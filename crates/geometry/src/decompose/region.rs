@@ -47,6 +47,25 @@ impl Region {
         builder.region
     }
 
+    /// Several regions as one, for boxes and images; it forgets the planes, so cut the regions themselves.
+    pub(super) fn joined(regions: &[&Self]) -> Self {
+        let mut joined = Self {
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+            planes: Vec::new(),
+            inner: Vec::new(),
+        };
+        for region in regions {
+            let first = joined.vertices.len() as u32;
+            joined.vertices.extend(&region.vertices);
+            joined.inner.extend(&region.inner);
+            joined
+                .triangles
+                .extend(region.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        joined
+    }
+
     pub(super) fn vertices(&self) -> &[Point3<f64>] {
         &self.vertices
     }
