@@ -66,7 +66,10 @@ impl Candidates {
             }
             let clouds = sides.map(Cloud::new);
             let directions = [axes[0], axes[1], axes[2], plane.normal];
-            let volume = clouds.iter().map(|c| c.rough_volume(&directions, body.min_extent)).sum();
+            let volume = clouds
+                .iter()
+                .map(|c| c.rough_volume(&directions, body.min_extent))
+                .sum();
             tried.push((volume, plane, clouds));
         }
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -74,7 +77,10 @@ impl Candidates {
         for (_, plane, clouds) in tried.into_iter().take(N_CAREFUL) {
             let boxes = clouds.map(|c| c.fit(&axes, body.min_extent));
             let found = Halves { plane, boxes };
-            if best.as_ref().is_none_or(|b| found.volume() < b.volume() * (1.0 - 1e-6)) {
+            if best
+                .as_ref()
+                .is_none_or(|b| found.volume() < b.volume() * (1.0 - 1e-6))
+            {
                 best = Some(found);
             }
         }
@@ -85,7 +91,8 @@ impl Candidates {
         let mut planes: Vec<Plane> = Vec::new();
         let mut add = |normal: Vector3<f64>, origin: Point3<f64>| {
             let is_known = |p: &Plane| {
-                p.normal.dot(&normal).abs() > 0.9999 && p.normal.dot(&(origin - p.origin)).abs() < 0.2 * body.min_slab
+                p.normal.dot(&normal).abs() > 0.9999
+                    && p.normal.dot(&(origin - p.origin)).abs() < 0.2 * body.min_slab
             };
             if !planes.iter().any(is_known) {
                 planes.push(Plane { normal, origin });
@@ -107,7 +114,10 @@ impl Candidates {
             add(fitted.axis(k), fitted.center());
         }
         let fits = |plane: &&Plane| {
-            let heights = region.vertices().iter().map(|p| plane.normal.dot(&(p - plane.origin)));
+            let heights = region
+                .vertices()
+                .iter()
+                .map(|p| plane.normal.dot(&(p - plane.origin)));
             let (low, high) = heights.fold((0.0_f64, 0.0_f64), |(low, high), h| (low.min(h), high.max(h)));
             low < -body.min_slab && high > body.min_slab
         };
@@ -139,7 +149,9 @@ impl Candidates {
             settled.push([version[i], version[j]]);
             let both = Group::joined(body, &groups[i], &groups[j]);
             let region = both.region();
-            let halves = self.best(body, &region, &both.fitted).map(|found| slide(body, &region, found));
+            let halves = self
+                .best(body, &region, &both.fitted)
+                .map(|found| slide(body, &region, found));
             let Some(halves) = halves.filter(|h| h.volume() < volume * (1.0 - BETTER)) else {
                 continue;
             };
@@ -157,10 +169,18 @@ impl Candidates {
 /// Moves a plane along its normal to where the two boxes are smallest, by golden section.
 fn slide(body: &Body, region: &Region, found: Halves) -> Halves {
     let normal = found.plane.normal;
-    let heights = region.vertices().iter().map(|p| normal.dot(&(p - found.plane.origin)));
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let heights = region
+        .vertices()
+        .iter()
+        .map(|p| normal.dot(&(p - found.plane.origin)));
+    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+        (l.min(x), h.max(x))
+    });
     let reach = SLIDE * (high - low);
-    let (mut from, mut to) = ((low + body.min_slab).max(-reach), (high - body.min_slab).min(reach));
+    let (mut from, mut to) = (
+        (low + body.min_slab).max(-reach),
+        (high - body.min_slab).min(reach),
+    );
     let axes = found.boxes.map(|b| [0, 1, 2].map(|k| b.axis(k)));
     let sides_at = |shift: f64| {
         let plane = Plane {
@@ -175,7 +195,9 @@ fn slide(body: &Body, region: &Region, found: Halves) -> Halves {
     let mut at = |shift: f64| {
         let rough = |(_, clouds): (Plane, [Cloud; 2])| -> f64 {
             let sides = clouds.iter().zip(&axes);
-            sides.map(|(cloud, axes)| cloud.rough_volume(axes, body.min_extent)).sum()
+            sides
+                .map(|(cloud, axes)| cloud.rough_volume(axes, body.min_extent))
+                .sum()
         };
         let volume = sides_at(shift).map_or(f64::INFINITY, rough);
         if volume < best.0 {
@@ -207,12 +229,19 @@ fn slide(body: &Body, region: &Region, found: Halves) -> Halves {
         plane,
         boxes: [fit(0), fit(1)],
     };
-    if moved.volume() < found.volume() { moved } else { found }
+    if moved.volume() < found.volume() {
+        moved
+    } else {
+        found
+    }
 }
 
 /// The box around a region with the axes of another turned by 45° about one of them.
 fn turned(region: &Region, fitted: &OrientedBox, axis: usize) -> OrientedBox {
-    let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(fitted.axis(axis)), std::f64::consts::FRAC_PI_4);
+    let turn = Rotation3::from_axis_angle(
+        &Unit::new_unchecked(fitted.axis(axis)),
+        std::f64::consts::FRAC_PI_4,
+    );
     let axes = turn * fitted.axes();
     let local = region.vertices().iter().map(|p| axes.inverse() * p.coords);
     let (low, high) = local.fold(
@@ -256,16 +285,23 @@ fn planes_at_concave_edges(whole: &Region) -> Vec<Plane> {
             for normal in [n, m] {
                 let origin = at(p);
                 let is_same = |(_, plane): &(f64, Plane)| {
-                    plane.normal.dot(&normal).abs() > 0.999 && plane.normal.dot(&(origin - plane.origin)).abs() < 0.01
+                    plane.normal.dot(&normal).abs() > 0.999
+                        && plane.normal.dot(&(origin - plane.origin)).abs() < 0.01
                 };
                 match weighted.iter().position(is_same) {
                     Some(known) => weighted[known].0 += weight,
-                    None if weighted.len() < 8 * N_CONCAVE => weighted.push((weight, Plane { normal, origin })),
+                    None if weighted.len() < 8 * N_CONCAVE => {
+                        weighted.push((weight, Plane { normal, origin }));
+                    }
                     None => {}
                 }
             }
         }
     }
     weighted.sort_by(|a, b| b.0.total_cmp(&a.0));
-    weighted.into_iter().take(N_CONCAVE).map(|(_, plane)| plane).collect()
+    weighted
+        .into_iter()
+        .take(N_CONCAVE)
+        .map(|(_, plane)| plane)
+        .collect()
 }

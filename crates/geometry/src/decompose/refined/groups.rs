@@ -25,8 +25,12 @@ impl Group {
     }
 
     fn with(parts: Vec<Part>, corners: Vec<Point3<f64>>, fitted: OrientedBox) -> Self {
-        let low = corners.iter().fold(Vector3::repeat(f64::INFINITY), |low, p| low.inf(&p.coords));
-        let high = corners.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |high, p| high.sup(&p.coords));
+        let low = corners
+            .iter()
+            .fold(Vector3::repeat(f64::INFINITY), |low, p| low.inf(&p.coords));
+        let high = corners
+            .iter()
+            .fold(Vector3::repeat(f64::NEG_INFINITY), |high, p| high.sup(&p.coords));
         Self {
             parts,
             corners,
@@ -54,7 +58,11 @@ impl Group {
     }
 
     fn fit(body: &Body, cloud: &Cloud, a: &Self, b: &Self) -> OrientedBox {
-        let larger = if a.fitted.volume() >= b.fitted.volume() { a } else { b };
+        let larger = if a.fitted.volume() >= b.fitted.volume() {
+            a
+        } else {
+            b
+        };
         cloud.fit(&[0, 1, 2].map(|k| larger.fitted.axis(k)), body.min_extent)
     }
 
@@ -89,7 +97,10 @@ impl Group {
             return None;
         }
         let [below, above] = sides;
-        Some([Self::new(below, halves.boxes[0]), Self::new(above, halves.boxes[1])])
+        Some([
+            Self::new(below, halves.boxes[0]),
+            Self::new(above, halves.boxes[1]),
+        ])
     }
 }
 
@@ -112,7 +123,10 @@ impl Merges {
         let n_merged = self.n_pieces.saturating_sub(n.max(1));
         let n_groups = self.n_pieces + n_merged;
         let gone: Vec<usize> = self.sides[..n_merged].iter().flatten().copied().collect();
-        (0..n_groups).filter(|i| !gone.contains(i)).map(|i| self.groups[i].clone()).collect()
+        (0..n_groups)
+            .filter(|i| !gone.contains(i))
+            .map(|i| self.groups[i].clone())
+            .collect()
     }
 
     pub(super) fn root(&self) -> usize {
@@ -142,7 +156,10 @@ pub(super) fn agglomerate(body: &Body, pieces: Vec<Group>) -> Merges {
         let is_near = apart || groups[i].touches(&groups[j], 0.1 * body.min_slab);
         is_near.then(|| {
             let volume = Group::joined_box(body, &groups[i], &groups[j]).volume();
-            (volume - groups[i].fitted.volume() - groups[j].fitted.volume(), [i, j])
+            (
+                volume - groups[i].fitted.volume() - groups[j].fitted.volume(),
+                [i, j],
+            )
         })
     };
     for i in 0..n_pieces {
@@ -151,7 +168,10 @@ pub(super) fn agglomerate(body: &Body, pieces: Vec<Group>) -> Merges {
     while open.len() > 1 {
         if pairs.is_empty() {
             let all = open.iter().flat_map(|&i| open.iter().map(move |&j| (i, j)));
-            pairs.extend(all.filter(|(i, j)| i > j).filter_map(|(i, j)| added(&groups, i, j, true)));
+            pairs.extend(
+                all.filter(|(i, j)| i > j)
+                    .filter_map(|(i, j)| added(&groups, i, j, true)),
+            );
         }
         let least = pairs.iter().copied().reduce(|a, b| if b.0 < a.0 { b } else { a });
         let Some((_, [i, j])) = least else { break };

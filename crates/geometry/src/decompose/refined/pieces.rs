@@ -2,10 +2,10 @@
 
 use super::candidates::{Candidates, Halves};
 use super::groups::Group;
+use crate::OrientedBox;
 use crate::decompose::body::{Body, Part};
 use crate::decompose::fit::Cloud;
 use crate::decompose::region::{Plane, Region};
-use crate::OrientedBox;
 
 /// A cut that takes off less than this share is no better than one that lets the next cuts take off more.
 const POOR: f64 = 0.1;
@@ -27,12 +27,17 @@ pub(super) fn cut_finely(body: &Body, candidates: &Candidates, n_pieces: usize) 
     while pieces.len() < n_pieces {
         let mut best: Option<usize> = None;
         for (i, piece) in pieces.iter().enumerate() {
-            if piece.halves.is_some() && piece.saved > least && best.is_none_or(|b| piece.saved > pieces[b].saved) {
+            if piece.halves.is_some()
+                && piece.saved > least
+                && best.is_none_or(|b| piece.saved > pieces[b].saved)
+            {
                 best = Some(i);
             }
         }
         let Some(i) = best else { break };
-        let Some(halves) = pieces[i].halves.take() else { break };
+        let Some(halves) = pieces[i].halves.take() else {
+            break;
+        };
         let parts = body.cut(&pieces[i].part, &halves.plane);
         if parts.iter().any(|p| p.thought.is_empty() || p.real.is_empty()) {
             continue;

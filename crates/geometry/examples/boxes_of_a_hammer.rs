@@ -1,4 +1,4 @@
-//! A hammer of two boxes, taken apart: `cargo run -p prehend-geometry --example decompose_hammer`.
+//! A hammer of two boxes, taken apart: `cargo run -p prehend-geometry --example boxes_of_a_hammer`.
 //!
 //! Prints the box around the whole, the two boxes that it is made of, and cvex = 1188 / (108 + 180) ≈ 4.1.
 
