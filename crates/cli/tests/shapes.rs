@@ -125,6 +125,31 @@ fn a_cube_is_one_box_and_an_l_is_two() {
         1,
         "a small gain splits less"
     );
+    let asked = prehend(&["decompose", &l, "--boxes", "2", "--json"], "").answer();
+    assert_close(&asked["cvex"], number(&lines[1]["cvex"]));
+    assert_eq!(asked["tree"].as_array().unwrap().len(), 3);
+    let picture = folder.path().join("l.png");
+    let refined = [
+        "decompose",
+        &l,
+        "--method",
+        "refined",
+        "--picture",
+        picture.to_str().unwrap(),
+        "--json",
+    ];
+    assert_eq!(
+        prehend(&refined, "").answer()["boxes"].as_array().unwrap().len(),
+        2
+    );
+    assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
+    let both = prehend(&["decompose", &l, &cube, "--picture", "x.png"], "");
+    assert_eq!(both.status, 2);
+    assert!(
+        both.stderr.contains("--picture draws one object; 2 are given"),
+        "{}",
+        both.stderr
+    );
 }
 
 #[test]
