@@ -1,10 +1,11 @@
-"""Writes hulls.json: epsilon, volume, origin distance and rank of grasps, by SciPy (Qhull, NNLS) and NumPy.
+"""Writes hulls.json: epsilon, volume, origin distance, rank and task scale of grasps, by SciPy (Qhull, NNLS, HiGHS).
 
     pip install scipy numpy
     python3 hulls.py > hulls.json
 
 Nothing here shares code with the crate: wrenches are built from the definition in docs/conventions.md, hulls by Qhull,
-distances by non-negative least squares. Sets whose hull Qhull refuses (flat ones) have epsilon 0 by definition.
+distances by non-negative least squares, task scales by linear programs. Contacts are [point, normal, mu, torsion], rounded
+where they are random; normals are not of unit length. Sets whose hull Qhull refuses (flat ones) have epsilon 0 by definition.
 """
 
 import itertools
@@ -12,21 +13,20 @@ import json
 
 import numpy as np
 import scipy
-from scipy.optimize import nnls
+from scipy.optimize import linprog, nnls
 from scipy.spatial import ConvexHull, QhullError
 
 rng = np.random.default_rng(20100)
 
 
-def wrenches(contact, center, scale, edges, unit):
-    n = np.array(contact["normal"])
-    p = np.array(contact["point"])
+def wrenches(contact, center, scale, edges, unit_name, gravity):
+    p, n, mu, torsion = np.array(contact[0:3]), unit(contact[3:6]), contact[6], contact[7]
     helper = np.array([0.0, 0.0, 1.0]) if abs(n[0]) > 1 - 1e-9 else np.array([1.0, 0.0, 0.0])
     t1 = np.cross(n, helper)
     t1 /= np.linalg.norm(t1)
     t2 = np.cross(n, t1)
-    mm = 1000.0 if unit == "m" else 1.0
-    e = contact["torsion"] * mm
+    mm = 1000.0 if unit_name == "m" else 1.0
+    e = torsion * mm
     samples = []
     if e > 0:
         for latitude, count in ((90, 1), (45, 5), (0, 8), (-45, 5), (-90, 1)):
@@ -42,30 +42,33 @@ def wrenches(contact, center, scale, edges, unit):
             samples.append(np.array([np.cos(theta), np.sin(theta), 0.0]))
     out = []
     for x, y, t in samples:
-        f = n + contact["mu"] * (x * t1 + y * t2)
-        tau = (np.cross(p - center, f) + contact["mu"] * t * n) / scale
-        out.append(np.concatenate([f, tau]))
+        f = n + mu * (x * t1 + y * t2)
+        tau = (np.cross(p - center, f) + mu * t * n) / scale
+        out.append(np.concatenate([f + gravity, tau]))
     return np.array(out)
 
 
 def points_of(case):
+    """Points whose hull is the space, and all wrenches: divided by the metric's semi-axes, over the axes that count."""
+    axes = [k for k, letter in enumerate(case["axes"]) if letter == "x"]
+    weights = np.array(case["semi_axes"])
     groups = [
-        wrenches(c, np.array(case["center"]), case["torque_scale"], case["cone_edges"], case["length_unit"])
+        (wrenches(c, np.array(case["center"]), case["torque_scale"], case["cone_edges"], case["length_unit"], np.array(case["gravity"])) / weights)[:, axes]
         for c in case["contacts"]
     ]
     if case["norm"] == "l1":
         return np.vstack(groups), np.vstack(groups)
     # Minkowski sum of {0} and each contact's wrenches, pruned to hull vertices by Qhull later.
-    total = np.zeros((1, 6))
+    total = np.zeros((1, len(axes)))
     for g in groups:
-        total = (total[:, None, :] + np.vstack([np.zeros(6), g])[None, :, :]).reshape(-1, 6)
+        total = (total[:, None, :] + np.vstack([np.zeros(len(axes)), g])[None, :, :]).reshape(-1, len(axes))
     return np.unique(total.round(14), axis=0), np.vstack(groups)
 
 
 def distance(points):
     """Least |sum w_i p_i| over convex weights: NNLS with the sum held at 1 by a heavy row, then polished."""
     a = np.vstack([points.T, np.full(len(points), 1e4)])
-    b = np.concatenate([np.zeros(6), [1e4]])
+    b = np.concatenate([np.zeros(points.shape[1]), [1e4]])
     w, _ = nnls(a, b, maxiter=10000)
     support = np.flatnonzero(w > 1e-12)
     # Exact least norm on the affine hull of the supporting points.
@@ -84,18 +87,36 @@ def hull_options(points):
     return None
 
 
+def task_scale(case):
+    """Largest s with -s t in the hull of the wrenches and 0, least over the task: one linear program each."""
+    _, raw = points_of(case)
+    best = np.inf
+    for t in case["task"]:
+        a_eq = np.hstack([raw.T, np.array(t)[:, None]])
+        cost = np.zeros(len(raw) + 1)
+        cost[-1] = -1.0
+        bound = np.append(np.ones(len(raw)), 0.0)[None, :]
+        found = linprog(cost, A_ub=bound, b_ub=[1.0], A_eq=a_eq, b_eq=np.zeros(6), method="highs")
+        best = min(best, -found.fun)
+    return float(best)
+
+
 def solve(case):
     points, raw = points_of(case)
+    n_axes = points.shape[1]
     scaled = raw.copy()
-    scaled[:, 3:] /= max(np.linalg.norm(scaled[:, 3:], axis=1).max(), 1e-12)
+    if n_axes == 6:
+        scaled[:, 3:] /= max(np.linalg.norm(scaled[:, 3:], axis=1).max(), 1e-12)
     case["rank"] = int(np.linalg.matrix_rank(scaled, tol=1e-10 * np.linalg.norm(scaled, 2)))
     largest = np.linalg.norm(raw, axis=1).max()
     affine = np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-10 * largest)
-    hull = hull_options(points) if affine == 6 else None
+    hull = hull_options(points) if affine == n_axes else None
     case["volume"] = float(hull.volume) if hull is not None else 0.0
     eps = float((-hull.equations[:, -1]).min()) if hull is not None else 0.0
     case["epsilon"] = eps if eps > 1e-9 * largest else 0.0
     case["force_closure"] = case["epsilon"] > 0.0
+    if case["task"]:
+        case["task_scale"] = task_scale(case)
     case["origin_distance"] = 0.0 if case["norm"] == "linf" or case["force_closure"] else distance(points)
     return case
 
@@ -105,18 +126,28 @@ def unit(v):
     return v / np.linalg.norm(v)
 
 
-def contact(p, n, mu, torsion=0.0):
-    return {"point": [float(x) for x in p], "normal": [float(x) for x in unit(n)], "mu": float(mu), "torsion": torsion}
+def contact(p, n, mu, torsion=0.0, exact=True):
+    n = np.asarray(n, dtype=float)
+    n = n / np.abs(n).max()
+    p = np.asarray(p, dtype=float)
+    if not exact:
+        p, n = p.round(5), n.round(4)
+    return [float(x) for x in p] + [float(x) for x in n] + [float(mu), torsion]
 
 
-def case(name, contacts, center=(0, 0, 0), scale=0.1, edges=8, norm="l1", unit_name="m"):
+def case(name, contacts, center=(0, 0, 0), scale=0.1, edges=8, norm="l1", unit_name="m", axes="xxxxxx", semi_axes=(1,) * 6, gravity=(0, 0, 0), task=()):
+    digits = 12 if "random" not in name else 5
     return {
         "name": name,
-        "center": [float(x) for x in center],
-        "torque_scale": float(scale),
+        "center": [round(float(x), digits) for x in center],
+        "torque_scale": round(float(scale), digits),
         "cone_edges": edges,
         "norm": norm,
         "length_unit": unit_name,
+        "axes": axes,
+        "semi_axes": [float(x) for x in semi_axes],
+        "gravity": [float(x) for x in gravity],
+        "task": [[float(x) for x in t] for t in task],
         "contacts": contacts,
     }
 
@@ -127,7 +158,7 @@ def on_ellipsoid(n, mu, torsion=0.0):
     for _ in range(n):
         d = unit(rng.normal(size=3))
         p = d * axes
-        out.append(contact(p, -p / axes**2, mu, torsion))
+        out.append(contact(p, -p / axes**2, mu, torsion, exact=False))
     return out, axes.max()
 
 
@@ -140,12 +171,12 @@ def on_box(n, mu, torsion=0.0):
         p[axis] = sign * half[axis]
         normal = np.zeros(3)
         normal[axis] = -sign
-        out.append(contact(p, normal, mu, torsion))
+        out.append(contact(p, normal, mu, torsion, exact=False))
     return out, float(np.linalg.norm(half))
 
 
 cases = []
-for i in range(130):
+for i in range(300):
     n, mu = int(rng.integers(1, 9)), float(rng.choice([0.2, 0.3, 0.5, 1.0, 2.0]))
     torsion = float(rng.choice([0.0, 0.0, 1.5e-3, 2.13e-3]))
     make = on_ellipsoid if i % 2 else on_box
@@ -155,11 +186,22 @@ for i in range(20):  # soft and point contacts mixed, in millimetres
     soft, scale = on_ellipsoid(int(rng.integers(1, 4)), 1.0, 2.0)
     hard, _ = on_ellipsoid(int(rng.integers(1, 5)), 0.3)
     for c in soft + hard:
-        c["point"] = [x * 1000 for x in c["point"]]
+        c[0:3] = [round(x * 1000, 3) for x in c[0:3]]
     cases.append(case(f"millimetres {i}", soft + hard, scale=scale * 1000, unit_name="mm"))
 for i in range(25):
     contacts, scale = (on_ellipsoid if i % 2 else on_box)(int(rng.integers(2, 5)), 0.8)
     cases.append(case(f"linf {i}", contacts, scale=scale, edges=int(rng.choice([3, 4])), norm="linf"))
+for i in range(40):  # masks of 2 to 5 axes
+    n_axes = 2 + i % 4
+    axes = "".join(rng.permutation(list("x" * n_axes + "." * (6 - n_axes))))
+    contacts, scale = (on_ellipsoid if i % 2 else on_box)(int(rng.integers(1, 7)), 0.5)
+    cases.append(case(f"random mask {i}", contacts, scale=scale, axes=axes, edges=int(rng.choice([4, 8]))))
+for i in range(40):  # metrics and gravity
+    contacts, scale = (on_ellipsoid if i % 2 else on_box)(int(rng.integers(2, 7)), 0.7, 2e-3 if i % 3 == 0 else 0.0)
+    cases.append(case(f"random metric {i}", contacts, scale=scale, semi_axes=rng.choice([0.25, 0.5, 1, 2, 3], 6), gravity=(rng.normal(size=3) * 0.2).round(3)))
+for i in range(40):  # task sets
+    contacts, scale = (on_ellipsoid if i % 2 else on_box)(int(rng.integers(2, 8)), 0.7, 2e-3 if i % 3 == 0 else 0.0)
+    cases.append(case(f"random task {i}", contacts, scale=scale, task=rng.normal(size=(int(rng.integers(1, 6)), 6)).round(2)))
 
 # Degenerate and symmetric sets.
 corners = [np.array(s) * 0.05 for s in itertools.product([-1, 1], repeat=3)]
@@ -198,4 +240,4 @@ restraint = [face_contact(a, s, s * u, -s * u * (a + 1), 0.0) for a, s in faces 
 cases.append(case("frictionless restraint", restraint, scale=0.0866))
 
 out = [solve(c) for c in cases]
-print(json.dumps({"made_by": f"scipy {scipy.__version__}, numpy {np.__version__}, hulls.py", "cases": out}, indent=None))
+print(json.dumps({"made_by": f"scipy {scipy.__version__}, numpy {np.__version__}, hulls.py", "cases": out}, separators=(",", ":")))
