@@ -31,7 +31,7 @@ pub(crate) struct Polytope<const D: usize> {
     inside: [f64; D],
     /// How far over a plane a point must stand to see it.
     tolerance: f64,
-    /// The insertion that looked at a facet last: `round` if it did not see it, `round + 1` if it did.
+    /// The insertion that looked at a facet last.
     stamps: Vec<u32>,
     round: u32,
     /// The first `n_seen` are the facets that see the point.
@@ -232,7 +232,7 @@ impl<const D: usize> Polytope<D> {
 
     /// Finds all facets that see the point, starting from one that does, and the ridges around them.
     fn flood(&mut self, point: &[f64; D], start: u32) {
-        self.round += 2;
+        self.round += 1;
         let round = self.round;
         // Room for all that may come; the loop then appends without asking whether it should (branches here are
         // coin tosses).
@@ -245,7 +245,7 @@ impl<const D: usize> Polytope<D> {
         self.seen[0] = start;
         let first = &mut self.facets[start as usize];
         first.height = first.plane.height(point);
-        self.stamps[start as usize] = round + 1;
+        self.stamps[start as usize] = round;
         let mut next = 0;
         while next < n_seen {
             let place = self.seen[next];
@@ -253,17 +253,16 @@ impl<const D: usize> Polytope<D> {
             let neighbors = self.facets[place as usize].neighbors;
             for (k, link) in neighbors.into_iter().enumerate() {
                 let across = link.place() as usize;
-                let mut stamp = self.stamps[across];
-                if stamp < round {
-                    let facet = &mut self.facets[across];
-                    facet.height = facet.plane.height(point);
-                    stamp = round + u32::from(facet.height > self.tolerance);
-                    self.stamps[across] = stamp;
-                    self.seen[n_seen] = link.place();
-                    n_seen += (stamp - round) as usize;
-                }
+                let facet = &mut self.facets[across];
+                // Measured again on every visit: cheaper than a branch that is wrong half of the time.
+                facet.height = facet.plane.height(point);
+                let sees = u32::from(facet.height > self.tolerance);
+                let new = u32::from(self.stamps[across] < round);
+                self.stamps[across] = round;
+                self.seen[n_seen] = link.place();
+                n_seen += (new & sees) as usize;
                 self.horizon[n_horizon] = (Link::new(place, k), link);
-                n_horizon += 1 - (stamp - round) as usize;
+                n_horizon += 1 - sees as usize;
             }
         }
         (self.n_seen, self.n_horizon) = (n_seen, n_horizon);
@@ -307,10 +306,13 @@ impl<const D: usize> Polytope<D> {
             let old = &self.facets[place];
             let new = old.neighbors[k].place();
             let (corners, links) = (old.corners, old.neighbors);
-            for j in 0..D {
-                if self.facets[new as usize].neighbors[j] != Link::UNSET {
-                    continue;
-                }
+            let mut open = 0_u32;
+            for (j, link) in self.facets[new as usize].neighbors.iter().enumerate() {
+                open |= u32::from(*link == Link::UNSET) << j;
+            }
+            while open != 0 {
+                let j = open.trailing_zeros() as usize;
+                open &= open - 1;
                 // The walk turns about the corners other than `pivot` and the one opposite the ridge it leaves by.
                 let (mut pivot, mut pivot_slot, mut link) = (corners[k], k, links[j]);
                 while !link.is_fresh() {
