@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_quality::{
-    ConeShape, Contact, GraspWrenchSpace, Norm, QualityError, QualityOptions, Wrench, grasp_quality,
+    ConeShape, Contact, EpsilonSolver, GraspWrenchSpace, LimitSurface, Norm, QualityError, QualityOptions,
+    Wrench, WrenchMetric, grasp_quality,
 };
 use proptest::prelude::*;
 
@@ -136,6 +137,53 @@ proptest! {
         prop_assert!((once.epsilon - twice.epsilon).abs() < 1e-10, "{once:?} {twice:?}");
         prop_assert_eq!(once.rank, twice.rank);
         prop_assert!((once.origin_distance - twice.origin_distance).abs() < 1e-8);
+    }
+
+    #[test]
+    fn a_rigid_motion_does_nothing_to_smooth_cones(contacts in grasp(6), axis in direction(), angle in 0.0..3.0_f64) {
+        let options = QualityOptions {
+            cone: ConeShape::Smooth,
+            limit_surface: LimitSurface::Ellipsoid,
+            ..options()
+        };
+        // The wrench ball is round over forces and over torques, so a turn about the centre keeps it.
+        let turn = UnitQuaternion::from_scaled_axis(angle * axis);
+        let turned: Vec<Contact> = contacts
+            .iter()
+            .map(|c| {
+                let point = options.center + turn * (c.at.point - options.center);
+                Contact::new(0, point, turn * c.at.normal.into_inner(), c.mu, c.torsion).unwrap()
+            })
+            .collect();
+        let mut solver = EpsilonSolver::default();
+        let mut bounds = |contacts: &[Contact]| {
+            solver.bounds(&GraspWrenchSpace::new(contacts, &options).unwrap()).unwrap()
+        };
+        let (here, there) = (bounds(&contacts), bounds(&turned));
+        prop_assert!(here.lower <= there.upper + 1e-9 && there.lower <= here.upper + 1e-9, "{here:?} {there:?}");
+    }
+
+    #[test]
+    fn wrenches_inside_the_hull_change_nothing(contacts in grasp(6), share in 0.0..1.0_f64) {
+        // The same contact with less friction pushes inside its own cone.
+        let hard: Vec<Contact> = contacts.iter().map(|c| Contact { torsion: 0.0, ..*c }).collect();
+        let more: Vec<Contact> = hard
+            .iter()
+            .copied()
+            .chain(hard.iter().map(|c| Contact { mu: share * c.mu, ..*c }))
+            .collect();
+        let before = grasp_quality(&hard, &options()).unwrap();
+        let after = grasp_quality(&more, &options()).unwrap();
+        prop_assert!((before.epsilon - after.epsilon).abs() < 1e-10);
+    }
+
+    #[test]
+    fn scaling_the_wrenches_scales_epsilon(contacts in grasp(6), factor in 0.1..10.0_f64) {
+        // A metric of 1/s² makes every wrench s times as short.
+        let metric = WrenchMetric::from_semi_axes([factor; 6]).unwrap();
+        let plain = grasp_quality(&contacts, &options()).unwrap();
+        let scaled = grasp_quality(&contacts, &QualityOptions { metric: Some(metric), ..options() }).unwrap();
+        prop_assert!((plain.epsilon - scaled.epsilon * factor).abs() < 1e-10);
     }
 
     #[test]
