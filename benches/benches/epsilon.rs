@@ -9,9 +9,7 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use faer::linalg::solvers::Solve;
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
-use prehend::quality::{
-    ConeShape, Contact, EpsilonSolver, GraspWrenchSpace, Norm, QualityOptions, epsilon,
-};
+use prehend::quality::{ConeShape, Contact, EpsilonSolver, GraspWrenchSpace, Norm, QualityOptions, epsilon};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -29,7 +27,13 @@ fn contact(i: usize, z: f64, turn: f64) -> Contact {
 
 /// Spread over the unit ball by the golden angle, normals inwards.
 fn even(n: usize) -> Vec<Contact> {
-    let at = |i| contact(i, 1.0 - (2 * i + 1) as f64 / n as f64, i as f64 * 2.399_963_229_728_653);
+    let at = |i| {
+        contact(
+            i,
+            1.0 - (2 * i + 1) as f64 / n as f64,
+            i as f64 * 2.399_963_229_728_653,
+        )
+    };
     (0..n).map(at).collect()
 }
 
@@ -38,7 +42,13 @@ fn random(n: usize, holding: bool) -> Vec<Vec<Contact>> {
     let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
     let mut sets = Vec::new();
     while sets.len() < 60 {
-        let mut one = |i| contact(i, rng.random_range(-1.0..1.0), rng.random_range(0.0..std::f64::consts::TAU));
+        let mut one = |i| {
+            contact(
+                i,
+                rng.random_range(-1.0..1.0),
+                rng.random_range(0.0..std::f64::consts::TAU),
+            )
+        };
         let set: Vec<Contact> = (0..n).map(&mut one).collect();
         let space = GraspWrenchSpace::new(&set, &options()).expect("sound contacts");
         if (epsilon(&space).expect("few facets") > 0.0) == holding {
@@ -85,7 +95,9 @@ fn exact(c: &mut Criterion) {
             });
         }
         group.bench_function(BenchmarkId::new("random, from contacts", format!("{n}x8")), |b| {
-            cycle(b, &sets, |s| solver.epsilon_of(s, &options()).expect("few facets"));
+            cycle(b, &sets, |s| {
+                solver.epsilon_of(s, &options()).expect("few facets")
+            });
         });
     }
     group.finish();
@@ -111,11 +123,25 @@ fn others(c: &mut Criterion) {
         });
     }
     group.bench_function("within 0.01, 8x8", |b| {
-        cycle(b, &held, |s| solver.epsilon_within(s, 0.01).expect("few facets").lower);
+        cycle(b, &held, |s| {
+            solver.epsilon_within(s, 0.01).expect("few facets").lower
+        });
     });
     let variants = [
-        ("smooth to 1e-4, 8", QualityOptions { cone: ConeShape::Smooth, ..options() }),
-        ("32 edges, 8x32", QualityOptions { cone: ConeShape::Edges(32), ..options() }),
+        (
+            "smooth to 1e-4, 8",
+            QualityOptions {
+                cone: ConeShape::Smooth,
+                ..options()
+            },
+        ),
+        (
+            "32 edges, 8x32",
+            QualityOptions {
+                cone: ConeShape::Edges(32),
+                ..options()
+            },
+        ),
     ];
     for (name, options) in variants {
         let spaces = spaces(&sets, &options);
@@ -123,7 +149,10 @@ fn others(c: &mut Criterion) {
             cycle(b, &spaces, |s| solver.epsilon(s).expect("few facets"));
         });
     }
-    let sum = QualityOptions { norm: Norm::LInf, ..options() };
+    let sum = QualityOptions {
+        norm: Norm::LInf,
+        ..options()
+    };
     let sums = spaces(&random(4, true), &sum);
     group.bench_function("sum of cones, 4x8", |b| {
         cycle(b, &sums, |s| solver.epsilon(s).expect("few facets"));
@@ -135,7 +164,10 @@ fn others(c: &mut Criterion) {
 type PlaneOf = fn(&[Vector6<f64>; 6]) -> Option<Vector6<f64>>;
 
 fn plane_by_nalgebra(points: &[Vector6<f64>; 6]) -> Option<Vector6<f64>> {
-    Matrix6::from_columns(points).transpose().lu().solve(&Vector6::repeat(1.0))
+    Matrix6::from_columns(points)
+        .transpose()
+        .lu()
+        .solve(&Vector6::repeat(1.0))
 }
 
 fn plane_by_faer(points: &[Vector6<f64>; 6]) -> Option<Vector6<f64>> {
@@ -156,12 +188,21 @@ fn plain_epsilon(wrenches: &[Vector6<f64>], simplex: &[Vector6<f64>], plane_of: 
         }
     };
     for left_out in 0..7 {
-        add(&points, std::array::from_fn(|i| i + usize::from(i >= left_out)), &mut facets);
+        add(
+            &points,
+            std::array::from_fn(|i| i + usize::from(i >= left_out)),
+            &mut facets,
+        );
     }
     // 1/|y| is the distance of the plane y · w = 1.
-    while let Some((_, plane)) = facets.iter().max_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared())) {
+    while let Some((_, plane)) = facets
+        .iter()
+        .max_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared()))
+    {
         let plane = *plane;
-        let best = wrenches.iter().max_by(|a, b| plane.dot(a).total_cmp(&plane.dot(b)));
+        let best = wrenches
+            .iter()
+            .max_by(|a, b| plane.dot(a).total_cmp(&plane.dot(b)));
         let Some(best) = best.filter(|w| plane.dot(w) > 1.0 + 1e-12) else {
             return 1.0 / plane.norm();
         };
@@ -188,8 +229,9 @@ fn plain_epsilon(wrenches: &[Vector6<f64>], simplex: &[Vector6<f64>], plane_of: 
 /// Seven wrenches of the set round the origin, found by trying; sets where that takes long are left out.
 fn round_the_origin(wrenches: &[Vector6<f64>], rng: &mut ChaCha8Rng) -> Option<Vec<Vector6<f64>>> {
     (0..20_000).find_map(|_| {
-        let chosen: Vec<Vector6<f64>> =
-            (0..7).map(|_| wrenches[rng.random_range(0..wrenches.len())]).collect();
+        let chosen: Vec<Vector6<f64>> = (0..7)
+            .map(|_| wrenches[rng.random_range(0..wrenches.len())])
+            .collect();
         let lifted = nalgebra::SMatrix::<f64, 7, 7>::from_fn(|r, c| if r < 6 { chosen[c][r] } else { 1.0 });
         let mut one = nalgebra::SVector::<f64, 7>::zeros();
         one[6] = 1.0;
