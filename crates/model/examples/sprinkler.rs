@@ -1,6 +1,6 @@
 //! The wet lawn: rain or the sprinkler? And a continuous child that tells how wet.
 
-use prehend_model::{Evidence, Model};
+use prehend_model::{Evidence, Latent, Model};
 use serde_json::json;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -21,7 +21,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{}",
         model.posterior(&["rain", "sprinkler"], &wet)?.to_json()?["joint"]
     );
-    println!("{}", model.explain("rain", &wet)?.to_json());
-    println!("{}", model.most_probable(&wet)?.to_json());
+    for sentence in model.explain("rain", &wet)?.words() {
+        println!("{sentence}");
+    }
+    let off = Evidence::from_json(&model, &json!({ "sprinkler": "off" }))?;
+    println!("{}", model.counterfactual("rain", &wet, &off)?.words()[0]);
+    println!("{}", model.most_probable(&wet, Latent::Summed)?.to_json());
     Ok(())
 }

@@ -102,11 +102,7 @@ impl Answer {
     }
 
     fn dimensions(&self, dims: &[usize]) -> Mixture {
-        let terms = self.terms.iter().map(|term| {
-            let (mean, root) = (term.mean.select_rows(dims), term.root().select_rows(dims));
-            Term::new(term.log_weight, Vec::new(), mean, root)
-        });
-        Mixture::new(terms.collect())
+        Mixture::new(self.terms.iter().map(|term| term.over(dims)).collect())
     }
 
     /// Joint values of the targets drawn from the answer: states of the discrete ones, numbers of the continuous ones, in
@@ -158,6 +154,43 @@ impl Answer {
             self.write_densities(at, &mut out)?;
         }
         Ok(Value::Object(out))
+    }
+
+    /// [`Answer::sample`] as JSON: one object a sample, from target to state or array.
+    pub fn samples_json(&self, n: usize, seed: u64) -> Value {
+        let samples = self.sample(n, seed).into_iter().map(|(states, point)| {
+            let (mut states, mut left) = (states.into_iter(), &point[..]);
+            let pairs = self.targets.iter().map(|target| match target {
+                Target::Discrete { name, states: names } => {
+                    (name.clone(), json!(states.next().map(|state| &names[state])))
+                }
+                Target::Continuous { name, columns, .. } => {
+                    let (own, rest) = left.split_at(columns.len());
+                    left = rest;
+                    (name.clone(), json!(own))
+                }
+            });
+            Value::Object(pairs.collect())
+        });
+        Value::Array(samples.collect())
+    }
+
+    /// The modes of the continuous targets' joint density as JSON, the highest first: `[{"mode", "log_density"}]`.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::FlatAnswer`] where there is no density, or no continuous target.
+    pub fn modes_json(&self) -> Result<Value, ModelError> {
+        let mixture = self.joint_mixture();
+        let names: Vec<&str> = self.targets.iter().map(Target::name).collect();
+        let modes = (mixture.dim() > 0).then(|| mixture.modes()).flatten();
+        let modes = modes.ok_or_else(|| ModelError::FlatAnswer {
+            node: names.join(","),
+        })?;
+        let modes = modes
+            .iter()
+            .map(|(mode, log)| json!({ "mode": mode.as_slice(), "log_density": log }));
+        Ok(Value::Array(modes.collect()))
     }
 
     fn write_marginal(&self, target: &Target, out: &mut Map<String, Value>) {

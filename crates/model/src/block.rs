@@ -45,14 +45,17 @@ struct Alternative {
 }
 
 /// Whether mixture components are summed, or the likeliest is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Latent {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Latent {
+    /// Summed.
+    #[default]
     Summed,
+    /// The likeliest is taken.
     Maximised,
 }
 
 impl Latent {
-    pub fn join(self, logs: &[f64]) -> f64 {
+    pub(crate) fn join(self, logs: &[f64]) -> f64 {
         match self {
             Self::Summed => log_sum_exp(logs),
             Self::Maximised => logs.iter().copied().fold(f64::NEG_INFINITY, f64::max),

@@ -186,8 +186,13 @@ impl<'a> Elimination<'a> {
         (scope, sizes)
     }
 
-    /// Every factor but those of blocks with targets.
-    pub fn tables(&self) -> Result<Tables, ModelError> {
+    /// Observed continuous nodes whose continuous parents are observed too.
+    pub fn locals(&self) -> &[NodeIdx] {
+        &self.locals
+    }
+
+    /// Every factor; those of blocks with targets only where `whole`.
+    pub fn tables(&self, whole: bool) -> Result<Tables, ModelError> {
         let mut states = self.states.clone();
         let mut tables = Vec::new();
         let mut flat = Vec::new();
@@ -217,7 +222,11 @@ impl<'a> Elimination<'a> {
             })?);
         }
         let mut lost = Vec::new();
-        for block in self.blocks.iter().filter(|block| block.targets.is_empty()) {
+        for block in self
+            .blocks
+            .iter()
+            .filter(|block| whole || block.targets.is_empty())
+        {
             let (scope, sizes) = self.only_free(block.scope.iter().copied());
             let (mut entry, table) = (0, tables.len());
             tables.push(LogTable::fill(scope, sizes, &mut states, |states| {
@@ -255,6 +264,20 @@ impl<'a> Elimination<'a> {
 
     /// log p(value | configuration, parents) of an observed family, components joined.
     fn log_local(&self, idx: NodeIdx, configuration: usize) -> Result<f64, ModelError> {
+        let logs: Vec<f64> = self
+            .terms(idx, configuration)?
+            .into_iter()
+            .map(|(_, log)| log)
+            .collect();
+        Ok(self.latent.join(&logs))
+    }
+
+    /// Components of an observed family with the logarithms of weight and density, all discrete nodes observed.
+    pub fn log_local_components(&self, idx: NodeIdx) -> Result<Vec<(usize, f64)>, ModelError> {
+        self.terms(idx, self.model.configuration(idx, &self.states))
+    }
+
+    fn terms(&self, idx: NodeIdx, configuration: usize) -> Result<Vec<(usize, f64)>, ModelError> {
         let value = full_value(self.evidence, idx).unwrap_or_default();
         let parents: Vec<f64> = self
             .model
@@ -265,11 +288,11 @@ impl<'a> Elimination<'a> {
             .copied()
             .collect();
         if let Cpd::VonMisesFisher(cpd) = &self.model.node(idx).cpd {
-            return Ok(self.latent.join(&cpd.log_terms(configuration, value)));
+            let row = cpd.components[configuration].iter().enumerate();
+            let numbers = row.filter(|(_, component)| component.weight > 0.0).map(|(k, _)| k);
+            return Ok(numbers.zip(cpd.log_terms(configuration, value)).collect());
         }
-        let terms = self.model.log_components(idx, configuration, value, &parents)?;
-        let logs: Vec<f64> = terms.into_iter().map(|(_, log)| log).collect();
-        Ok(self.latent.join(&logs))
+        self.model.log_components(idx, configuration, value, &parents)
     }
 
     /// What a block contributes for the given states; the pieces where asked for.

@@ -32,6 +32,23 @@ pub enum Observation {
     },
 }
 
+impl Observation {
+    /// As a person says it: a state's name, a number, an array.
+    pub(crate) fn in_words(&self, states: &[String]) -> String {
+        let number = |x: &f64| if x.is_nan() { "?".into() } else { x.to_string() };
+        let array = |values: &[f64]| match values {
+            [one] => number(one),
+            many => format!("[{}]", many.iter().map(number).collect::<Vec<_>>().join(", ")),
+        };
+        match self {
+            Self::State(state) => states.get(*state).cloned().unwrap_or_default(),
+            Self::Likelihood(likelihood) => format!("as likely as {}", array(likelihood)),
+            Self::Value(value) => array(value),
+            Self::Uncertain { mean, .. } => format!("about {}", array(mean)),
+        }
+    }
+}
+
 /// Observed nodes. The order in which they were entered does not matter.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Evidence {

@@ -1,12 +1,14 @@
-//! Why an answer came out as it did, and the single likeliest story.
+//! Why an answer came out as it did, in nats and in words, and what it would have been otherwise.
 
 use serde_json::{Map, Value, json};
 
-use crate::cpd::{Cpd, NodeIdx};
+use crate::cpd::Cpd;
 use crate::error::ModelError;
-use crate::evidence::{Evidence, Observation};
-use crate::json::rows;
+use crate::evidence::Evidence;
 use crate::model::Model;
+
+/// A contribution below this, in nats, is not worth a word: one part in twenty.
+const WORTH_A_WORD: f64 = 0.05;
 
 /// Contributions of the observed nodes to the odds between states of a discrete target.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,30 +34,15 @@ pub struct Contrast {
     pub total: f64,
 }
 
-/// The likeliest joint state of the unobserved discrete nodes, and the continuous nodes given it.
+/// The posterior of a target as it is, and as it would be with some observations replaced.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MostProbable {
-    /// Natural logarithm of the posterior probability of these states.
-    pub log_probability: f64,
-    /// Natural logarithm of the density of the evidence.
-    pub log_evidence: f64,
-    /// Unobserved discrete nodes with their states.
-    pub states: Vec<(String, String)>,
-    /// Unobserved (or partly observed) continuous nodes given those states and the evidence.
-    pub values: Vec<ProbableValue>,
-}
-
-/// A continuous node in the likeliest story.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ProbableValue {
-    /// The node.
-    pub node: String,
-    /// Its conditional mean.
-    pub mean: Vec<f64>,
-    /// The mean of the conditional component where the density is highest; `None` where a component is singular.
-    pub mode: Option<Vec<f64>>,
-    /// Its conditional covariance.
-    pub covariance: Vec<Vec<f64>>,
+pub struct Counterfactual {
+    /// The target.
+    pub target: String,
+    /// What is replaced or added, in words: `fvol` and its value.
+    pub changes: Vec<(String, String)>,
+    /// State, its probability as things are, and as they would be.
+    pub states: Vec<(String, f64, f64)>,
 }
 
 impl Model {
@@ -83,6 +70,7 @@ impl Model {
         };
         let log_posterior = |evidence: &Evidence| -> Result<Vec<f64>, ModelError> {
             let answer = self.posterior(&[target], evidence)?;
+            answer.exact()?;
             let mut out = vec![f64::NEG_INFINITY; cpd.states.len()];
             for term in &answer.terms {
                 out[term.states[0]] = term.log_weight;
@@ -125,103 +113,45 @@ impl Model {
         })
     }
 
-    /// The likeliest joint state of the unobserved discrete nodes, all hidden numbers and mixture components summed out;
-    /// then, given it, mean and mode of every continuous node that is not wholly observed, each by itself.
+    /// What the posterior of a discrete target would be had some nodes been observed otherwise (or at all), everything
+    /// else as it was observed. This is a statement about evidence, not about an intervention.
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`].
-    pub fn most_probable(&self, evidence: &Evidence) -> Result<MostProbable, ModelError> {
-        let is_free = |idx: NodeIdx| match (&self.node(idx).cpd, evidence.get(idx)) {
-            // Directions are not Gaussian: they are left out, and asked about by themselves.
-            (Cpd::Discrete(_), Some(Observation::State(_))) | (Cpd::VonMisesFisher(_), _) => false,
-            (Cpd::Mixture(_), Some(Observation::Value(value))) => value.iter().any(|v| v.is_nan()),
-            _ => true,
+    /// As [`Model::posterior`]; a continuous target.
+    pub fn counterfactual(
+        &self,
+        target: &str,
+        evidence: &Evidence,
+        changes: &Evidence,
+    ) -> Result<Counterfactual, ModelError> {
+        let mut other = evidence.clone();
+        let mut changed = Vec::new();
+        for (idx, observation) in changes.iter() {
+            let name = &self.node(idx).name;
+            other = other.with(self, name, observation.clone())?;
+            changed.push((name.clone(), observation.in_words(self.node(idx).states())));
+        }
+        let posterior = |evidence: &Evidence| -> Result<Vec<f64>, ModelError> {
+            let answer = self.posterior(&[target], evidence)?;
+            answer.exact()?;
+            answer.posterior(target).ok_or_else(|| ModelError::BadValue {
+                node: target.into(),
+                found: "a continuous target to explain".into(),
+                expected: "a discrete node".into(),
+            })
         };
-        let free: Vec<NodeIdx> = (0..self.nodes().len())
-            .map(NodeIdx)
-            .filter(|&idx| is_free(idx))
-            .collect();
-        let discrete: Vec<&str> = free
-            .iter()
-            .filter(|&&idx| self.n_states(idx) > 0)
-            .map(|&idx| self.node(idx).name.as_str())
-            .collect();
-        let answer = self.posterior(&discrete, evidence)?;
-        let mut best = &answer.terms[0];
-        for term in &answer.terms {
-            if term.log_weight > best.log_weight {
-                best = term;
-            }
-        }
-        let mut given = evidence.clone();
-        let mut states = Vec::with_capacity(discrete.len());
-        for (name, &state) in discrete.iter().zip(&best.states) {
-            states.push((
-                (*name).to_string(),
-                self.node(self.index(name)?).states()[state].clone(),
-            ));
-            given = given.with(self, name, Observation::State(state))?;
-        }
-        let mut values = Vec::new();
-        for &idx in free.iter().filter(|&&idx| self.n_states(idx) == 0) {
-            let node = self.node(idx).name.clone();
-            let answer = self.posterior(&[&node], &given)?;
-            if let Some(mixture) = answer.mixture(&node) {
-                values.push(ProbableValue {
-                    mean: mixture.mean().iter().copied().collect(),
-                    mode: mixture.mode().map(|mode| mode.iter().copied().collect()),
-                    covariance: rows(&mixture.covariance()),
-                    node,
-                });
-            }
-        }
-        Ok(MostProbable {
-            log_probability: best.log_weight,
-            log_evidence: answer.log_evidence,
-            states,
-            values,
+        let (before, after) = (posterior(evidence)?, posterior(&other)?);
+        let states = self.node(self.index(target)?).states().iter().cloned();
+        Ok(Counterfactual {
+            target: target.into(),
+            changes: changed,
+            states: states
+                .zip(before)
+                .zip(after)
+                .map(|((state, before), after)| (state, before, after))
+                .collect(),
         })
-    }
-
-    /// The same model with other priors: `"trained"`, `"uniform"`, or `{"task": {"pouring": 0.5, …}}`; states left out
-    /// get 0, and the numbers are divided by their sum.
-    ///
-    /// # Errors
-    ///
-    /// The value is none of these, or names unknown nodes or states.
-    pub fn with_priors_json(&self, value: &Value) -> Result<Self, ModelError> {
-        let bad = || ModelError::BadValue {
-            node: "prior".into(),
-            found: value.to_string(),
-            expected: "\"trained\", \"uniform\" or {NODE: {STATE: probability}} with a positive sum".into(),
-        };
-        match value {
-            Value::String(word) if word == "trained" => Ok(self.clone()),
-            Value::String(word) if word == "uniform" => Ok(self.with_uniform_priors()),
-            Value::Object(nodes) => {
-                let mut model = self.clone();
-                for (name, prior) in nodes {
-                    let idx = self.index(name)?;
-                    let Value::Object(prior) = prior else {
-                        return Err(bad());
-                    };
-                    let mut numbers = vec![0.0; self.n_states(idx)];
-                    for (state, number) in prior {
-                        let state = crate::evidence::read_state(self, idx, &Value::from(state.as_str()))?;
-                        numbers[state] = number.as_f64().ok_or_else(bad)?;
-                    }
-                    let sum: f64 = numbers.iter().sum();
-                    if !(sum > 0.0 && sum.is_finite()) {
-                        return Err(bad());
-                    }
-                    let numbers: Vec<f64> = numbers.into_iter().map(|p| p / sum).collect();
-                    model = model.with_prior(name, &numbers)?;
-                }
-                Ok(model)
-            }
-            _ => Err(bad()),
-        }
     }
 }
 
@@ -238,31 +168,94 @@ impl Explanation {
             let entry = json!({ "prior": contrast.prior, "contributions": parts, "total": contrast.total });
             against.insert(contrast.other.clone(), entry);
         }
-        json!({ "target": self.target, "state": self.state, "against": against })
+        json!({ "target": self.target, "state": self.state, "against": against, "words": self.words() })
+    }
+
+    /// One sentence for each other state: how many times more probable the likeliest state is, and which observations
+    /// make it so, the strongest first.
+    pub fn words(&self) -> Vec<String> {
+        self.against
+            .iter()
+            .map(|contrast| contrast.words(&self.state))
+            .collect()
     }
 }
 
-impl MostProbable {
-    /// `{"log_probability", "log_evidence", "states": {NODE: state}, "values": {NODE: {"mean", "mode", "covariance"}}}`.
+impl Contrast {
+    fn words(&self, state: &str) -> String {
+        let mut parts: Vec<(&str, f64)> = self
+            .contributions
+            .iter()
+            .map(|(node, nats)| (node.as_str(), *nats))
+            .collect();
+        parts.push(("what is common", self.prior));
+        parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        let told: Vec<String> = parts
+            .iter()
+            .filter(|(_, nats)| nats.abs() >= WORTH_A_WORD || nats.is_nan())
+            .map(|(node, nats)| {
+                let side = if *nats > 0.0 { "for" } else { "against" };
+                format!("{node} speaks {side} it ({nats:+.2} nats)")
+            })
+            .collect();
+        let why = if told.is_empty() {
+            "no observation tells them apart".into()
+        } else {
+            told.join(", ")
+        };
+        format!(
+            "`{state}` is {} as probable as `{}`: {why}",
+            times(self.total),
+            self.other
+        )
+    }
+}
+
+/// exp(nats) as a person says it.
+fn times(nats: f64) -> String {
+    let ratio = nats.exp();
+    if ratio.is_finite() && ratio < 1e4 {
+        format!("{ratio:.3} times")
+    } else if nats.is_finite() {
+        format!("10^{:.0} times", nats / std::f64::consts::LN_10)
+    } else {
+        "infinitely many times".into()
+    }
+}
+
+impl Counterfactual {
+    /// "had `fvol` been 0.9, `pouring` would have 0.71 (now 0.23)", the state that changes most first.
+    pub fn words(&self) -> Vec<String> {
+        let had: Vec<String> = self
+            .changes
+            .iter()
+            .map(|(node, value)| format!("`{node}` been {value}"))
+            .collect();
+        let mut states: Vec<&(String, f64, f64)> = self.states.iter().collect();
+        states.sort_by(|a, b| (b.2 - b.1).abs().total_cmp(&(a.2 - a.1).abs()));
+        states
+            .into_iter()
+            .map(|(state, before, after)| {
+                format!(
+                    "had {}, `{state}` would have {after:.3} (now {before:.3})",
+                    had.join(" and ")
+                )
+            })
+            .collect()
+    }
+
+    /// `{"target", "changes": {NODE: value in words}, "posterior": {STATE: {"now", "then"}}, "words"}`.
     pub fn to_json(&self) -> Value {
+        let changes: Map<String, Value> = self
+            .changes
+            .iter()
+            .map(|(node, value)| (node.clone(), json!(value)))
+            .collect();
         let states: Map<String, Value> = self
             .states
             .iter()
-            .map(|(node, state)| (node.clone(), json!(state)))
+            .map(|(state, before, after)| (state.clone(), json!({ "now": before, "then": after })))
             .collect();
-        let values: Map<String, Value> = self
-            .values
-            .iter()
-            .map(|value| {
-                let entry = json!({ "mean": value.mean, "mode": value.mode, "covariance": value.covariance });
-                (value.node.clone(), entry)
-            })
-            .collect();
-        json!({
-            "log_probability": self.log_probability,
-            "log_evidence": self.log_evidence,
-            "states": states,
-            "values": values,
-        })
+        json!({ "target": self.target, "changes": changes, "posterior": states, "words": self.words() })
     }
 }

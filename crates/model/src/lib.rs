@@ -35,6 +35,7 @@ mod cpd;
 mod interchange;
 mod json;
 mod model;
+mod priors;
 mod sample;
 
 mod cell;
@@ -57,8 +58,10 @@ mod log_table;
 
 mod batch;
 mod explain;
+mod most_probable;
 mod plan;
 mod reader;
+mod surprise;
 mod tree;
 
 mod double_double;
@@ -74,20 +77,23 @@ mod von_mises_fisher_train;
 
 pub use answer::{Answer, Target};
 pub use batch::{BatchQuery, RowAnswer};
+pub use block::Latent;
 pub use cell::{CellReport, OrderScore};
 pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 pub use direction_answer::DirectionAnswer;
 pub use error::ModelError;
 pub use evidence::{Evidence, Observation};
-pub use explain::{Contrast, Explanation, MostProbable, ProbableValue};
+pub use explain::{Contrast, Counterfactual, Explanation};
 pub use interchange::Export;
 pub use mixture::{Mixture, Term};
 pub use model::{Model, Node};
+pub use most_probable::{MostProbable, ProbableValue};
 pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, VonMisesFisherSpec};
 pub use structure::{
     LearnedArc, LearnedStructure, StructureOptions, StructureRules, StructureScore, learn_structure,
     score_structure,
 };
+pub use surprise::Surprise;
 pub use table::{Column, Table};
 pub use train::{NodeReport, TrainOptions, TrainReport, Trained, train};
 pub use von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};

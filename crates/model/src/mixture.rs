@@ -43,6 +43,12 @@ impl Term {
         }
     }
 
+    /// Its Gaussian over the given dimensions, without states.
+    pub(crate) fn over(&self, dims: &[usize]) -> Self {
+        let (mean, root) = (self.mean.select_rows(dims), self.root.select_rows(dims));
+        Self::new(self.log_weight, Vec::new(), mean, root)
+    }
+
     /// root · rootᵀ is the covariance.
     pub(crate) fn root(&self) -> &DMatrix<f64> {
         &self.root
@@ -102,6 +108,11 @@ impl Mixture {
     pub(crate) fn new(components: Vec<Term>) -> Self {
         let factors = components.iter().map(Factor::new).collect();
         Self { components, factors }
+    }
+
+    /// The marginal over some dimensions, in the given order.
+    pub(crate) fn over(&self, dims: &[usize]) -> Self {
+        Self::new(self.components.iter().map(|term| term.over(dims)).collect())
     }
 
     /// Its components: weights, means and covariances.

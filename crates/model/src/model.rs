@@ -32,7 +32,7 @@ pub struct Node {
 /// A mixed Bayesian network (Eq. 1): P(x) = Π P(xᵢ | parents of xᵢ), checked as a whole.
 #[derive(Debug, Clone)]
 pub struct Model {
-    nodes: Vec<Node>,
+    pub(crate) nodes: Vec<Node>,
     extra: Map<String, Value>,
     order: Vec<NodeIdx>,
     names: BTreeMap<String, NodeIdx>,
@@ -175,41 +175,6 @@ impl Model {
         parents
             .iter()
             .fold(0, |row, &parent| row * self.n_states(parent) + states[parent.0])
-    }
-
-    /// The same model with another distribution of a discrete root.
-    ///
-    /// # Errors
-    ///
-    /// The node is unknown, continuous, or has parents; the numbers are no distribution over its states.
-    pub fn with_prior(&self, name: &str, prior: &[f64]) -> Result<Self, ModelError> {
-        let idx = self.index(name)?;
-        let mut nodes = self.nodes.clone();
-        match &mut nodes[idx.0].cpd {
-            Cpd::Discrete(cpd) if cpd.parents.is_empty() => cpd.table = vec![prior.to_vec()],
-            _ => {
-                return Err(ModelError::BadValue {
-                    node: name.into(),
-                    found: "a prior for a node that is continuous or has parents".into(),
-                    expected: "a discrete node without parents".into(),
-                });
-            }
-        }
-        Self::new(nodes, self.extra.clone())
-    }
-
-    /// The same model with a uniform distribution in every discrete root.
-    #[must_use]
-    pub fn with_uniform_priors(&self) -> Self {
-        let mut model = self.clone();
-        for node in &mut model.nodes {
-            if let Cpd::Discrete(cpd) = &mut node.cpd
-                && cpd.parents.is_empty()
-            {
-                cpd.table = vec![vec![1.0 / cpd.states.len() as f64; cpd.states.len()]];
-            }
-        }
-        model
     }
 
     /// Free parameters of all nodes together.

@@ -97,7 +97,7 @@ impl Answer {
 type Sums = BTreeMap<Vec<usize>, BlockSum>;
 
 fn run(query: &Elimination) -> Result<Answer, ModelError> {
-    let tables = query.tables()?;
+    let tables = query.tables(false)?;
     let mut written: BTreeSet<NodeIdx> = query.targets.iter().copied().collect();
     written.extend(
         query

@@ -1,6 +1,6 @@
 //! Laws of answers, the formats, and errors that help.
 
-use prehend_model::{Evidence, Model, ModelError, Observation};
+use prehend_model::{Evidence, Latent, Model, ModelError, Observation};
 use serde_json::{Value, json};
 
 /// The example of docs/model-format.md.
@@ -78,7 +78,7 @@ fn the_sprinkler_is_explained_away() {
         .to_json()
         .unwrap();
     assert_eq!(both["joint"].as_array().unwrap().len(), 3);
-    let story = sprinkler.most_probable(&wet).unwrap();
+    let story = sprinkler.most_probable(&wet, Latent::Summed).unwrap();
     assert_eq!(
         story.states,
         [("rain".into(), "no".into()), ("sprinkler".into(), "on".into())]
@@ -318,5 +318,120 @@ fn shared_weights_are_checked_and_kept() {
     assert_eq!(
         message,
         "`size`: configuration 1, component 0: differs from configuration 0, though `weights` is \"shared\""
+    );
+}
+
+#[test]
+fn an_explanation_has_words_and_a_counterfactual() {
+    let model = example();
+    let evidence = Evidence::from_json(&model, &json!({ "size": [2.0, 1.0] })).unwrap();
+    let words = model.explain("task", &evidence).unwrap().words();
+    assert_eq!(words.len(), 1);
+    assert!(
+        words[0].starts_with("`pouring` is ") && words[0].contains("size speaks for it (+"),
+        "{words:?}"
+    );
+    let changes = Evidence::from_json(&model, &json!({ "size": [0.1, 0.2] })).unwrap();
+    let other = model.counterfactual("task", &evidence, &changes).unwrap();
+    let then = model
+        .posterior(&["task"], &changes)
+        .unwrap()
+        .posterior("task")
+        .unwrap();
+    assert_eq!(other.states.iter().map(|s| s.2).collect::<Vec<_>>(), then);
+    assert!(
+        other.words()[0].starts_with("had `size` been [0.1, 0.2], `"),
+        "{:?}",
+        other.words()
+    );
+}
+
+#[test]
+fn what_no_row_of_the_model_looks_like_is_a_surprise() {
+    let model = oracle_model();
+    let score = |json: Value| {
+        model
+            .surprise(&Evidence::from_json(&model, &json).unwrap())
+            .unwrap()
+    };
+    let strange = score(json!({ "size": [30.0, -30.0], "fvol": 0.2 }));
+    assert_eq!(strange.tail, 1.0 / 1000.0);
+    assert!(
+        strange.words().contains("the model knows nothing like it"),
+        "{}",
+        strange.words()
+    );
+    assert!(
+        strange.words().ends_with("odd by itself: `size`"),
+        "{}",
+        strange.words()
+    );
+    // Rows of the model itself score uniformly: their mean is a half within three standard errors.
+    let rows = Evidence::from_table(&model, &model.sample(20, 5)).unwrap();
+    let tails: Vec<f64> = rows
+        .into_iter()
+        .map(|row| {
+            let hidden = ["egpc", "upos", "dir", "rigid"].map(|name| model.index(name).unwrap());
+            model
+                .surprise(&hidden.into_iter().fold(row, Evidence::without))
+                .unwrap()
+                .tail
+        })
+        .collect();
+    let mean = tails.iter().sum::<f64>() / 20.0;
+    assert!((mean - 0.5).abs() < 3.0 * (1.0f64 / 12.0 / 20.0).sqrt(), "{mean}");
+}
+
+#[test]
+fn the_likeliest_components_may_tell_another_story() {
+    // Two narrow halves of "two" are together likelier than the one component of "one", each alone is not.
+    let model = Model::from_json(
+        r#"{ "format": "prehend-model", "version": 1, "nodes": [
+        { "name": "kind", "kind": "discrete", "states": ["one", "two"], "table": [[0.45, 0.55]] },
+        { "name": "x", "kind": "gaussian_mixture", "discrete_parents": ["kind"], "components": [
+            [{ "weight": 1.0, "mean": [0.0], "covariance": [[1.0]] }],
+            [{ "weight": 0.5, "mean": [0.1], "covariance": [[1.0]] }, { "weight": 0.5, "mean": [-0.1], "covariance": [[1.0]] }]] },
+        { "name": "y", "kind": "gaussian_mixture", "continuous_parents": ["x"], "components": [
+            [{ "weight": 1.0, "mean": [1.0], "coefficients": [[2.0]], "covariance": [[0.5]] }]] }] }"#,
+    )
+    .unwrap();
+    let seen = Evidence::from_json(&model, &json!({ "x": 0.05 })).unwrap();
+    let summed = model.most_probable(&seen, Latent::Summed).unwrap();
+    let maximised = model.most_probable(&seen, Latent::Maximised).unwrap();
+    assert_eq!(summed.states, [("kind".into(), "two".into())]);
+    assert_eq!(maximised.states, [("kind".into(), "one".into())]);
+    assert_eq!(maximised.components, [("x".into(), 0), ("y".into(), 0)]);
+    assert!((maximised.values[0].mean[0] - 1.1).abs() < 1e-12);
+    // log P(one, component | x): 0.45 N(0.05; 0, 1) over the evidence.
+    let one = 0.45 * (-0.5f64 * 0.0025).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    assert!((maximised.log_probability - (one.ln() - maximised.log_evidence)).abs() < 1e-12);
+}
+
+#[test]
+fn a_long_chain_of_discrete_nodes_is_no_matter_of_its_joint_states() {
+    // 60 nodes of 3 states: 4e28 joint states.
+    let mut nodes = vec![
+        json!({ "name": "n0", "kind": "discrete", "states": ["a", "b", "c"], "table": [[0.2, 0.3, 0.5]] }),
+    ];
+    for i in 1..60 {
+        nodes.push(json!({ "name": format!("n{i}"), "kind": "discrete", "states": ["a", "b", "c"], "parents": [format!("n{}", i - 1)],
+            "table": [[0.8, 0.1, 0.1], [0.2, 0.6, 0.2], [0.1, 0.2, 0.7]] }));
+    }
+    let model =
+        Model::from_json(&json!({ "format": "prehend-model", "version": 1, "nodes": nodes }).to_string())
+            .unwrap();
+    let end = Evidence::new().with_state(&model, "n59", "b").unwrap();
+    let start = model.posterior(&["n0", "n30"], &end).unwrap();
+    assert!((start.posterior("n0").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    // Far from both ends the chain is in its stationary distribution: the left eigenvector of its matrix.
+    let middle = start.posterior("n30").unwrap();
+    let stationary = [8.0 / 19.0, 5.0 / 19.0, 6.0 / 19.0];
+    assert!(
+        middle.iter().zip(stationary).all(|(p, s)| (p - s).abs() < 1e-6),
+        "{middle:?}"
+    );
+    assert_eq!(
+        model.most_probable(&end, Latent::Summed).unwrap().states.len(),
+        59
     );
 }

@@ -17,8 +17,10 @@ pub struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Action {
-    /// .bin to .json or back, without loss
-    #[command(after_help = "Example:\n  prehend model convert out/models/human/paper.bin paper.json")]
+    /// By the extensions: .bin and .json without loss; .bif, .xmlbif (.xml), .net, and to .dot, with a list of losses
+    #[command(
+        after_help = "Examples:\n  prehend model convert out/models/human/paper.bin paper.json\n  prehend model convert alarm.bif alarm.json\n  prehend model convert paper.json paper.net"
+    )]
     Convert {
         /// The model to read
         from: PathBuf,
@@ -31,39 +33,62 @@ impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
         let Action::Convert { from, to } = self.action;
         let model = read_model(&from)?;
-        write(&to, &model)?;
-        let answer = json!({ "from": from.to_string_lossy(), "to": to.to_string_lossy(), "nodes": model.nodes().len() });
+        let losses = write(&to, &model)?;
+        let answer = json!({
+            "from": from.to_string_lossy(), "to": to.to_string_lossy(), "nodes": model.nodes().len(), "losses": losses,
+        });
         output::answer(json, &answer, output::plain)?;
         Ok(Outcome::Done)
     }
 }
 
-/// Reads a model by its extension: .bin or .json.
+/// The extensions that a model can be read from.
+const READABLE: &str = ".bin, .json, .bif, .xmlbif (.xml) or .net";
+
+/// Reads a model by its extension.
 pub fn read_model(path: &Path) -> Result<Model> {
     let bytes = prehend::files::read(path)?;
     let name = || path.display().to_string();
-    match prehend::files::extension(path).as_deref() {
-        Some("bin") => Model::from_bytes(&bytes).with_context(name),
-        Some("json") | None => {
-            let text = String::from_utf8(bytes).with_context(name)?;
-            Model::from_json(&text).with_context(name)
-        }
+    let extension = prehend::files::extension(path);
+    if extension.as_deref() == Some("bin") {
+        return Model::from_bytes(&bytes).with_context(name);
+    }
+    let text = || String::from_utf8(bytes).with_context(name);
+    match extension.as_deref() {
+        Some("json") | None => Model::from_json(&text()?),
+        Some("bif") => Model::from_bif(&text()?),
+        Some("xmlbif" | "xml") => Model::from_xmlbif(&text()?),
+        Some("net") => Model::from_net(&text()?),
         Some(other) => bail!(
-            "{}: the extension `.{other}` is no model; use .bin or .json",
+            "{}: the extension `.{other}` is no model; use {READABLE}",
             path.display()
         ),
     }
+    .with_context(name)
 }
 
-fn write(path: &Path, model: &Model) -> Result<()> {
-    let bytes = match prehend::files::extension(path).as_deref() {
-        Some("bin") => model.to_bytes(),
-        Some("json") => model.to_json().into_bytes(),
+/// Writes a model by its extension; what the format cannot hold comes back.
+fn write(path: &Path, model: &Model) -> Result<Vec<String>> {
+    let name = || path.display().to_string();
+    let export = match prehend::files::extension(path).as_deref() {
+        Some("bin") => {
+            prehend::files::write(path, &model.to_bytes())?;
+            return Ok(Vec::new());
+        }
+        Some("json") => {
+            prehend::files::write(path, model.to_json().as_bytes())?;
+            return Ok(Vec::new());
+        }
+        Some("bif") => model.to_bif().with_context(name)?,
+        Some("xmlbif" | "xml") => model.to_xmlbif().with_context(name)?,
+        Some("net") => model.to_net().with_context(name)?,
+        Some("dot") => model.to_dot(),
         other => bail!(
-            "{}: a model cannot be written as `.{}` yet; use .bin or .json",
+            "{}: a model cannot be written as `.{}`; use {READABLE}, or .dot",
             path.display(),
             other.unwrap_or("")
         ),
     };
-    Ok(prehend::files::write(path, &bytes)?)
+    prehend::files::write(path, export.text.as_bytes())?;
+    Ok(export.losses)
 }

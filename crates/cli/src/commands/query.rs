@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use prehend::frame::Frame;
-use prehend::model::{Cpd, Evidence, Model, ModelError};
+use prehend::model::{Cpd, Evidence, Latent, Model, ModelError};
 use prehend::training::to_table;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -47,13 +47,35 @@ pub struct Arguments {
     #[arg(long, default_value = "trained")]
     prior: String,
 
-    /// Also how much each observed node speaks for each state of the (single, discrete) target
+    /// Also how much each observed node speaks for each state of the (single, discrete) target, and whether the evidence
+    /// resembles anything that the model knows
     #[arg(long)]
     explain: bool,
+
+    /// Also what the posterior of the (single, discrete) target would be had these nodes been observed so, the rest as it
+    /// is: a JSON object like {"fvol":0.9}
+    #[arg(long)]
+    counterfactual: Option<String>,
+
+    /// Also so many joint values of the targets, drawn from the answer
+    #[arg(long, default_value_t = 0)]
+    samples: usize,
+
+    /// Seed of --samples
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+
+    /// Also the modes of a (single, continuous) target, the highest first
+    #[arg(long)]
+    modes: bool,
 
     /// Also the most probable explanation: the likeliest values of all nodes that were not observed
     #[arg(long)]
     mpe: bool,
+
+    /// In --mpe, take the likeliest mixture components too, instead of summing over them
+    #[arg(long, requires = "mpe")]
+    mpe_components: bool,
 }
 
 /// One question.
@@ -162,7 +184,18 @@ impl Arguments {
                 [name] if matches!(model.node(model.index(name)?).cpd, Cpd::VonMisesFisher(_)) => {
                     model.direction_posterior(name, evidence)?.to_json_at(at)?
                 }
-                _ => model.posterior(&names, evidence)?.to_json_at(at)?,
+                _ => {
+                    let posterior = model.posterior(&names, evidence)?;
+                    let mut answer = posterior.to_json_at(at)?;
+                    if self.samples > 0 {
+                        answer["samples"] = posterior.samples_json(self.samples, self.seed);
+                    }
+                    if self.modes {
+                        let modes = posterior.modes_json();
+                        answer["modes"] = modes.map_err(|e| anyhow::anyhow!("--modes: {e}"))?;
+                    }
+                    answer
+                }
             }
         };
         if self.explain {
@@ -170,9 +203,24 @@ impl Arguments {
                 bail!(Usage("--explain needs exactly one --target".into()))
             };
             answer["explanation"] = model.explain(target, evidence)?.to_json();
+            answer["surprise"] = model.surprise(evidence)?.to_json();
+        }
+        if let Some(text) = &self.counterfactual {
+            let [target] = targets else {
+                bail!(Usage("--counterfactual needs exactly one --target".into()))
+            };
+            let value: Value = serde_json::from_str(text)
+                .map_err(|e| Usage(format!("--counterfactual: {e}; expected '{{\"NODE\": value}}'")))?;
+            let changes = Evidence::from_json(model, &value)?;
+            answer["counterfactual"] = model.counterfactual(target, evidence, &changes)?.to_json();
         }
         if self.mpe {
-            answer["mpe"] = model.most_probable(evidence)?.to_json();
+            let latent = if self.mpe_components {
+                Latent::Maximised
+            } else {
+                Latent::Summed
+            };
+            answer["mpe"] = model.most_probable(evidence, latent)?.to_json();
         }
         Ok(answer)
     }
