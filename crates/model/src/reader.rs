@@ -5,35 +5,67 @@ use nalgebra::DMatrix;
 /// exp(−45) = 3e-20 is lost in the last digit of a sum that is at least 1.
 const NEGLIGIBLE: f64 = 45.0;
 
-/// A matrix applied to [row, 1], row by row; entries left of the first and right of the last that is not zero are
-/// skipped.
-pub(crate) struct Reader {
-    rows: Vec<(usize, usize, usize)>,
+/// Rows that are worked out together: as many sums run beside each other.
+const LANES: usize = 4;
+
+/// Matrices that are applied to [row, 1], one behind the other in memory.
+#[derive(Default)]
+pub(crate) struct Readers {
+    /// Columns that are not zero.
+    columns: Vec<usize>,
+    /// For every block of four rows and every such column four entries, zeros where the matrix has fewer rows.
     values: Vec<f64>,
 }
 
-impl Reader {
-    pub fn new(matrix: &DMatrix<f64>) -> Self {
-        let mut rows = Vec::with_capacity(matrix.nrows());
-        let mut values = Vec::new();
-        for row in matrix.row_iter() {
-            let first = row.iter().position(|v| *v != 0.0).unwrap_or(0);
-            let end = row.iter().rposition(|v| *v != 0.0).map_or(first, |last| last + 1);
-            rows.push((first, values.len(), end - first));
-            values.extend(row.iter().skip(first).take(end - first));
+/// One of the matrices.
+#[derive(Clone, Copy)]
+pub(crate) struct Reader {
+    first_column: usize,
+    n_columns: usize,
+    first_value: usize,
+    n_blocks: usize,
+}
+
+impl Readers {
+    pub fn push(&mut self, matrix: &DMatrix<f64>) -> Reader {
+        let reader = Reader {
+            first_column: self.columns.len(),
+            first_value: self.values.len(),
+            n_columns: 0,
+            n_blocks: matrix.nrows().div_ceil(LANES),
+        };
+        let used = |j: &usize| matrix.column(*j).iter().any(|v| *v != 0.0);
+        self.columns.extend((0..matrix.ncols()).filter(used));
+        let columns = &self.columns[reader.first_column..];
+        for block in 0..reader.n_blocks {
+            for &j in columns {
+                let entry = |i: usize| matrix.get((i, j)).copied().unwrap_or(0.0);
+                self.values
+                    .extend((0..LANES).map(|lane| entry(block * LANES + lane)));
+            }
         }
-        Self { rows, values }
+        Reader {
+            n_columns: columns.len(),
+            ..reader
+        }
     }
 
     /// |R x|²; x ends with 1.
-    pub fn norm_squared(&self, x: &[f64]) -> f64 {
+    pub fn norm_squared(&self, reader: Reader, x: &[f64]) -> f64 {
+        let columns = &self.columns[reader.first_column..reader.first_column + reader.n_columns];
         let mut square = 0.0;
-        for &(column, start, n) in &self.rows {
-            let mut sum = 0.0;
-            for (value, x) in self.values[start..start + n].iter().zip(&x[column..column + n]) {
-                sum += value * x;
+        let mut start = reader.first_value;
+        for _ in 0..reader.n_blocks {
+            let end = start + LANES * columns.len();
+            let mut sums = [0.0; LANES];
+            for (&j, values) in columns.iter().zip(self.values[start..end].chunks_exact(LANES)) {
+                let x = x[j];
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += value * x;
+                }
             }
-            square += sum * sum;
+            square += (sums[0] * sums[0] + sums[1] * sums[1]) + (sums[2] * sums[2] + sums[3] * sums[3]);
+            start = end;
         }
         square
     }
@@ -82,6 +114,17 @@ impl LogSum {
 mod tests {
     use super::*;
     use crate::gaussian::log_sum_exp;
+
+    #[test]
+    fn a_reader_gives_the_squared_norm_of_the_product() {
+        let matrix = DMatrix::from_fn(5, 3, |i, j| if j == 1 { 0.0 } else { (i + 1) as f64 - j as f64 });
+        let mut readers = Readers::default();
+        readers.push(&DMatrix::identity(2, 3));
+        let reader = readers.push(&matrix);
+        let x = [0.5, 7.0, 1.0];
+        let expected = (matrix * nalgebra::DVector::from_column_slice(&x)).norm_squared();
+        assert!((readers.norm_squared(reader, &x) - expected).abs() < 1e-12);
+    }
 
     #[test]
     fn a_running_sum_is_the_sum() {

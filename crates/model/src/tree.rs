@@ -13,10 +13,12 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use crate::block::Step;
 use crate::gaussian::{log_add, log_sum_exp};
 use crate::model::Model;
-use crate::reader::{LogSum, Reader};
+use crate::reader::{LogSum, Reader, Readers};
 use crate::root_gaussian::RootGaussian;
 
 /// Terms this far below the largest one are left out, in nats: e⁻⁴⁵ = 3e-20, and a tree has fewer than 1e6 terms, so
@@ -27,6 +29,7 @@ const MAX_BRANCHES: usize = 200_000;
 
 /// The compiled block.
 pub(crate) struct Tree {
+    readers: Readers,
     branches: Vec<Branch>,
     top: Range<usize>,
     /// log weight of the paths that observe nothing.
@@ -47,9 +50,14 @@ struct Branch {
 impl Tree {
     /// `None` where a component has no density, or the tree would be too large.
     pub fn grow(model: &Model, steps: &[Step], columns: usize) -> Option<Self> {
-        let mut branches = Vec::new();
-        let (top, bare) = grow(model, steps, &RootGaussian::empty(columns), &mut branches)?;
-        Some(Self { branches, top, bare })
+        let mut grown = Grown::default();
+        let (top, bare) = grow(model, steps, &RootGaussian::empty(columns), &mut grown)?;
+        Some(Self {
+            readers: grown.readers,
+            branches: grown.branches,
+            top,
+            bare,
+        })
     }
 
     /// log of the block's integral at [row, 1].
@@ -57,25 +65,34 @@ impl Tree {
         let mut sum = LogSum::default();
         sum.add(self.bare);
         open.clear();
-        self.open(self.top.clone(), 0.0, row, open);
+        self.open(self.top.clone(), 0.0, row, &mut sum, open);
         // The most promising subtree is opened first: what is left out later is compared with the largest term.
         while let Some((bound, value, i)) = open.pop() {
-            if bound < sum.largest() - NEGLIGIBLE {
-                continue;
+            if bound >= sum.largest() - NEGLIGIBLE {
+                sum.add(value + self.branches[i].end);
+                self.open(self.branches[i].children.clone(), value, row, &mut sum, open);
             }
-            let branch = &self.branches[i];
-            sum.add(value + branch.end);
-            self.open(branch.children.clone(), value, row, open);
         }
         sum.value()
     }
 
-    /// Puts branches on the stack, the one with the highest bound on top.
-    fn open(&self, range: Range<usize>, value: f64, row: &[f64], open: &mut Vec<(f64, f64, usize)>) {
+    /// Adds up leaves, and puts other branches on the stack, the one with the highest bound on top.
+    fn open(
+        &self,
+        range: Range<usize>,
+        value: f64,
+        row: &[f64],
+        sum: &mut LogSum,
+        open: &mut Vec<(f64, f64, usize)>,
+    ) {
         let start = open.len();
         for i in range {
             let branch = &self.branches[i];
-            let value = value + branch.constant - 0.5 * branch.reader.norm_squared(row);
+            let value = value + branch.constant - 0.5 * self.readers.norm_squared(branch.reader, row);
+            if branch.children.is_empty() {
+                sum.add(value + branch.end);
+                continue;
+            }
             let entry = (value + branch.below, value, i);
             // Insertion: there are few.
             let mut place = open.len();
@@ -89,48 +106,54 @@ impl Tree {
     }
 }
 
+/// What has grown so far.
+#[derive(Default)]
+struct Grown {
+    readers: Readers,
+    branches: Vec<Branch>,
+}
+
 /// Branches for the first observation among the steps, and the log weight of paths without one.
 fn grow(
     model: &Model,
     steps: &[Step],
     gaussian: &RootGaussian,
-    branches: &mut Vec<Branch>,
+    grown: &mut Grown,
 ) -> Option<(Range<usize>, f64)> {
     let mut level = Vec::new();
     let mut bare = f64::NEG_INFINITY;
     collect(model, steps, (0.0, gaussian), &mut level, &mut bare)?;
-    if branches.len() + level.len() > MAX_BRANCHES {
+    if grown.branches.len() + level.len() > MAX_BRANCHES {
         return None;
     }
-    let start = branches.len();
+    let start = grown.branches.len();
     let mut pending = Vec::with_capacity(level.len());
     for found in level {
-        branches.push(Branch {
+        grown.branches.push(Branch {
             constant: found.constant,
-            reader: found.reader,
+            reader: grown.readers.push(&found.white),
             below: 0.0,
             children: 0..0,
             end: f64::NEG_INFINITY,
         });
         pending.push((found.gaussian, found.rest));
     }
-    let end = branches.len();
+    let end = grown.branches.len();
     for (i, (gaussian, rest)) in (start..end).zip(pending) {
-        let (children, bare) = grow(model, rest, &gaussian, branches)?;
-        let peaks: Vec<f64> = children
-            .clone()
-            .map(|j| branches[j].constant + branches[j].below)
-            .collect();
-        branches[i].below = log_add(bare, log_sum_exp(&peaks));
-        branches[i].end = bare;
-        branches[i].children = children;
+        let (children, bare) = grow(model, rest, &gaussian, grown)?;
+        let below = |branch: &Branch| branch.constant + branch.below;
+        let peaks: Vec<f64> = grown.branches[children.clone()].iter().map(below).collect();
+        let branch = &mut grown.branches[i];
+        branch.below = log_add(bare, log_sum_exp(&peaks));
+        branch.end = bare;
+        branch.children = children;
     }
     Some((start..end, bare))
 }
 
 struct Found<'a> {
     constant: f64,
-    reader: Reader,
+    white: DMatrix<f64>,
     gaussian: RootGaussian,
     rest: &'a [Step],
 }
@@ -153,7 +176,7 @@ fn collect<'a>(
         match white {
             Some(white) => out.push(Found {
                 constant,
-                reader: Reader::new(&white),
+                white,
                 gaussian: after,
                 rest,
             }),

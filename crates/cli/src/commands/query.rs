@@ -18,8 +18,10 @@ use crate::output::{self, Outcome, Usage};
     after_help = "Examples:\n  prehend query out/models/human/task-action.bin --target task --evidence '{\"size\":[0.11,0.08,0.1],\"cvex\":1.3}'\n\
   prehend query out/models/human/task-action.json --target upos --evidence '{\"task\":\"pouring\"}' --at '[[1,0,0],[0,0,1]]'"
 )]
+// Flags of a command line are bools, each on its own.
+#[allow(clippy::struct_excessive_bools)]
 pub struct Arguments {
-    /// A model (.bin or .json)
+    /// A model (.bin, .json, .bif, .xmlbif, .net)
     model: PathBuf,
 
     /// Nodes asked about, separated by commas; several give their joint distribution
