@@ -289,7 +289,9 @@ impl<'a> Elimination<'a> {
             .collect();
         if let Cpd::VonMisesFisher(cpd) = &self.model.node(idx).cpd {
             let row = cpd.components[configuration].iter().enumerate();
-            let numbers = row.filter(|(_, component)| component.weight > 0.0).map(|(k, _)| k);
+            let numbers = row
+                .filter(|(_, component)| component.weight > 0.0)
+                .map(|(k, _)| k);
             return Ok(numbers.zip(cpd.log_terms(configuration, value)).collect());
         }
         self.model.log_components(idx, configuration, value, &parents)

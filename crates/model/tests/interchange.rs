@@ -207,3 +207,68 @@ fn what_cannot_be_written_says_so() {
     );
     assert!(mixed().to_dot().text.contains("\"rain\" -> \"task\";"));
 }
+
+#[test]
+fn files_of_pgmpy_and_pyagrum_are_read_and_they_read_ours() {
+    // `oracle/foreign.py` wrote these with both programs, and has both read what stands in `ours.*`.
+    let expected: Value = serde_json::from_str(include_str!("oracle/foreign/expected.json")).unwrap();
+    let files = [
+        (
+            "pgmpy.bif",
+            Model::from_bif(include_str!("oracle/foreign/pgmpy.bif")),
+        ),
+        (
+            "pgmpy.xmlbif",
+            Model::from_xmlbif(include_str!("oracle/foreign/pgmpy.xmlbif")),
+        ),
+        (
+            "pgmpy.net",
+            Model::from_net(include_str!("oracle/foreign/pgmpy.net")),
+        ),
+        (
+            "pyagrum.bif",
+            Model::from_bif(include_str!("oracle/foreign/pyagrum.bif")),
+        ),
+        (
+            "pyagrum.bifxml",
+            Model::from_xmlbif(include_str!("oracle/foreign/pyagrum.bifxml")),
+        ),
+        (
+            "pyagrum.net",
+            Model::from_net(include_str!("oracle/foreign/pyagrum.net")),
+        ),
+    ];
+    for (file, model) in files {
+        let model = model.unwrap_or_else(|e| panic!("{file}: {e}"));
+        let seen = Evidence::from_json(&model, &json!({ "wet": "soaked", "sprinkler": "off" })).unwrap();
+        let season = model
+            .posterior(&["season"], &seen)
+            .unwrap()
+            .posterior("season")
+            .unwrap();
+        for (found, expected) in season
+            .iter()
+            .zip(expected["season_given_soaked_and_off"].as_array().unwrap())
+        {
+            // Programs print so many digits.
+            assert!(
+                (found - expected.as_f64().unwrap()).abs() < 1e-6,
+                "{file}: {season:?}"
+            );
+        }
+    }
+    let ours = discrete_part();
+    assert_eq!(
+        ours.to_bif().unwrap().text,
+        include_str!("oracle/foreign/ours.bif")
+    );
+    assert_eq!(
+        ours.to_xmlbif().unwrap().text,
+        include_str!("oracle/foreign/ours.xmlbif")
+    );
+    assert_eq!(
+        ours.to_net().unwrap().text,
+        include_str!("oracle/foreign/ours.net")
+    );
+    assert_eq!(expected["ours_read_by"].as_array().unwrap().len(), 6);
+}
