@@ -240,9 +240,12 @@ fn round_the_origin(wrenches: &[Vector6<f64>], rng: &mut ChaCha8Rng) -> Option<V
     })
 }
 
+/// The wrenches of a set, and seven of them round the origin.
+type Started = (Vec<Vector6<f64>>, Vec<Vector6<f64>>);
+
 fn kernels(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let cases: Vec<(Vec<Vector6<f64>>, Vec<Vector6<f64>>)> = spaces(&random(4, true), &options())
+    let cases: Vec<Started> = spaces(&random(4, true), &options())
         .iter()
         .filter_map(|s| Some((s.wrenches().to_vec(), round_the_origin(s.wrenches(), &mut rng)?)))
         .collect();
