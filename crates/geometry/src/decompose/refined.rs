@@ -20,6 +20,7 @@ pub(super) fn refine(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decom
     let candidates = Candidates::new(&body, options.n_cells);
     let most = options.max_boxes;
     let (n_pieces, wanted, price) = match options.method {
+        DecomposeMethod::Exactly { boxes: 1 } => (1, Some(1), 0.0),
         DecomposeMethod::Exactly { boxes } => (2 * boxes + 6, Some(boxes.min(most)), 0.0),
         DecomposeMethod::Refined { price } => (N_PIECES, None, price * body.quick_root.volume()),
         DecomposeMethod::FitAndSplit => (most, Some(most), 0.0),
