@@ -6,6 +6,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::winding::solid_angle;
 
+/// A lid that takes up less of the view (steradians, of 4π) is not looked at closely.
+const SMALL_VIEW: f64 = 0.05;
+
 /// Loops of edges that triangles on one side only have.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Holes {
@@ -15,6 +18,10 @@ pub(crate) struct Holes {
 #[derive(Debug, Clone)]
 struct Rim {
     middle: Point3<f64>,
+    /// No edge's end is farther from the middle.
+    radius: f64,
+    /// Area of the lid: triangles from the middle to each edge.
+    lid_area: f64,
     edges: Vec<[Point3<f64>; 2]>,
 }
 
@@ -62,8 +69,15 @@ impl Holes {
         }
         let rim = |edges: Vec<[Point3<f64>; 2]>| {
             let sum: Vector3<f64> = edges.iter().map(|[a, _]| a.coords).sum();
+            let middle = Point3::from(sum / edges.len() as f64);
+            let ends = edges.iter().flatten().map(|p| (p - middle).norm());
             Rim {
-                middle: (sum / edges.len() as f64).into(),
+                middle,
+                radius: ends.fold(0.0, f64::max),
+                lid_area: edges
+                    .iter()
+                    .map(|[a, b]| (a - middle).cross(&(b - middle)).norm() / 2.0)
+                    .sum(),
                 edges,
             }
         };
@@ -77,6 +91,13 @@ impl Holes {
     pub(crate) fn are_far_from(&self, p: &Point3<f64>, radius: f64) -> bool {
         let mut view = 0.0;
         for rim in &self.rims {
+            // Seen from afar, a lid takes up no more than its area over its distance squared.
+            let clear = (rim.middle - p).norm() - rim.radius;
+            let most = rim.lid_area / (clear * clear);
+            if clear >= 2.0 * radius && clear > 0.0 && most < SMALL_VIEW {
+                view += most;
+                continue;
+            }
             let mut lid = 0.0;
             for [a, b] in &rim.edges {
                 let middle = nalgebra::center(a, b);

@@ -63,6 +63,7 @@ mod planar;
 mod read;
 mod repair;
 mod shared_volume;
+mod sides;
 mod signed_distance;
 mod simplex;
 mod solid;

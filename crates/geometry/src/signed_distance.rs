@@ -36,7 +36,9 @@ impl Surface {
         if self.is_inside(p) { -distance } else { distance }
     }
 
-    /// The signed distance from the grid: some tens of nanoseconds, and how far off it may be.
+    /// The signed distance from the grid, and how far off it may be.
+    ///
+    /// Takes some tens of nanoseconds; the first query in a part of space near the surface some tens of microseconds.
     ///
     /// The error is at most √3/2 of [`grid_spacing`](Self::grid_spacing) within twice that spacing of the surface, four
     /// times as much elsewhere near the object, and grows with the distance far from it. Around holes, where the sign
@@ -70,7 +72,7 @@ impl Surface {
         self.grid().spacing()
     }
 
-    /// Memory of the grid, bytes.
+    /// Memory of the grid, bytes; grows as queries come near more of the surface.
     pub fn grid_bytes(&self) -> usize {
         self.grid().n_bytes()
     }
@@ -81,7 +83,10 @@ impl Surface {
     /// Positive: how far the two are apart. Negative: a ball or capsule would have to shrink by so much, the deepest point
     /// of a convex piece is so far below the surface. Exact up to rounding for balls, and for all solids whose core lies
     /// outside the object; where a core reaches inside, its deepest point is found to within `tolerance` (m, at least a
-    /// micrometre), which costs more the smaller it is. A [`Mesh`](crate::Solid::Mesh) counts with its corners there.
+    /// micrometre), which costs more the smaller it is. The search halves the core into parts and stops at 200,000 of
+    /// them, as may happen with a small tolerance where a wide core lies along the middle of a plate: the result is then
+    /// the least distance seen, above the true one by an unknown amount. A [`Mesh`](crate::Solid::Mesh) counts with its
+    /// corners there.
     pub fn signed_gap(&self, solid: &Collider, surface_from_solid: &Isometry3<f64>, tolerance: f64) -> f64 {
         if let Core::Point = solid.core {
             return self.signed_distance(&surface_from_solid.translation.vector.into()) - solid.radius;

@@ -6,6 +6,8 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::TriMesh;
 use crate::distance_grid::DistanceGrid;
+use crate::holes::Holes;
+use crate::sides::Sides;
 use crate::triangle_tree::TriangleTree;
 use crate::winding::WindingTree;
 
@@ -33,11 +35,7 @@ pub struct Surface {
 #[derive(Debug)]
 struct Shared {
     mesh: TriMesh,
-    tree: TriangleTree,
-    winding: WindingTree,
     grid: DistanceGrid,
-    low: Point3<f64>,
-    high: Point3<f64>,
 }
 
 /// A point of a surface.
@@ -61,21 +59,19 @@ pub struct Hit {
 }
 
 impl Surface {
-    /// Makes a mesh ready. Takes some tens of nanoseconds a triangle and about 0.1 s for the grid.
+    /// Makes a mesh ready: some microseconds a triangle. Near the surface, the grid is measured where it is first asked for.
     pub fn new(mesh: TriMesh) -> Self {
         let tree = TriangleTree::new(&mesh);
-        let winding = WindingTree::new(&mesh);
         let (low, high) = mesh.axis_aligned_bounds();
-        let grid = DistanceGrid::new(&tree, &winding, low, high);
+        let sides = Sides {
+            low,
+            high,
+            holes: Holes::of(&tree.triangles),
+            winding: WindingTree::new(&mesh),
+        };
+        let grid = DistanceGrid::new(tree, sides);
         Self {
-            shared: Arc::new(Shared {
-                mesh,
-                tree,
-                winding,
-                grid,
-                low,
-                high,
-            }),
+            shared: Arc::new(Shared { mesh, grid }),
         }
     }
 
@@ -86,7 +82,7 @@ impl Surface {
 
     /// Lowest and highest coordinates.
     pub fn axis_aligned_bounds(&self) -> (Point3<f64>, Point3<f64>) {
-        (self.shared.low, self.shared.high)
+        (self.sides().low, self.sides().high)
     }
 
     /// The point of the surface that is closest to `p`.
@@ -117,23 +113,21 @@ impl Surface {
     /// segmentation using generalized winding numbers*, 2013). Costs a pass over all triangles; [`is_inside`](Self::is_inside)
     /// looks at a few.
     pub fn winding_number(&self, p: &Point3<f64>) -> f64 {
-        self.shared.winding.winding_number(p)
+        self.sides().winding.winding_number(p)
     }
 
     /// Whether `p` lies inside: its winding number is above one half (below −½ for a mesh turned inside out).
     ///
     /// The same answer as [`winding_number`](Self::winding_number) gives, from far fewer triangles.
     pub fn is_inside(&self, p: &Point3<f64>) -> bool {
-        let within = (0..3).all(|k| p[k] >= self.shared.low[k] && p[k] <= self.shared.high[k]);
-        within
-            && self
-                .shared
-                .grid
-                .side(p)
-                .unwrap_or_else(|| self.shared.winding.is_inside(p))
+        let (low, high) = self.axis_aligned_bounds();
+        let within = (0..3).all(|k| p[k] >= low[k] && p[k] <= high[k]);
+        within && self.grid().side(p).unwrap_or_else(|| self.sides().is_inside(p))
     }
 
-    /// A lower bound of the distance from `p` to the surface, from the grid; some tens of nanoseconds.
+    /// A lower bound of the distance from `p` to the surface, from the grid.
+    ///
+    /// Takes some tens of nanoseconds; the first query in a part of space near the surface some tens of microseconds.
     pub fn distance_lower_bound(&self, p: &Point3<f64>) -> f64 {
         self.shared.grid.lower_bound(p)
     }
@@ -150,7 +144,11 @@ impl Surface {
     }
 
     pub(crate) fn tree(&self) -> &TriangleTree {
-        &self.shared.tree
+        &self.shared.grid.tree
+    }
+
+    fn sides(&self) -> &Sides {
+        &self.shared.grid.sides
     }
 }
 
