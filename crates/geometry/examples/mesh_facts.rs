@@ -30,8 +30,8 @@ fn main() -> Result<(), GeometryError> {
     let open = read_mesh(CUBE.as_bytes(), MeshFormat::Off)?;
     let report = inspect(&open);
     println!(
-        "as read: {} hole, perimeter {:.1} m",
-        report.n_holes, report.hole_perimeters[0]
+        "as read: {} hole, perimeter {:.1} m, area {:.2} m²",
+        report.n_holes, report.holes[0].perimeter, report.holes[0].area
     );
 
     let closed = CUBE.replace("8 5 0", "8 6 0") + "4 4 7 6 5\n";

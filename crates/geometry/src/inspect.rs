@@ -1,11 +1,10 @@
 //! What shape a mesh is in.
 
-use std::collections::BTreeMap;
-
+use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::TriMesh;
-use crate::topology::{Edges, Groups, components, is_collapsed, position_triangles};
+use crate::topology::{Edges, chains, components, is_collapsed, position_triangles};
 
 /// What shape a mesh is in. Vertices at equal positions count as one, so an STL file can be watertight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,8 +23,19 @@ pub struct MeshReport {
     pub n_components: usize,
     /// Holes: groups of boundary edges that hang together.
     pub n_holes: usize,
-    /// Length of each hole's boundary (m), longest first.
-    pub hole_perimeters: Vec<f64>,
+    /// The holes, the one with the longest boundary first.
+    pub holes: Vec<Hole>,
+}
+
+/// A group of boundary edges that hang together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Hole {
+    /// How many edges it has.
+    pub edges: usize,
+    /// Their length (m).
+    pub perimeter: f64,
+    /// The area (m²) of what would close it: exact where the boundary is a flat loop, less than that of any cover else.
+    pub area: f64,
 }
 
 /// Looks a mesh over without changing it.
@@ -36,12 +46,14 @@ pub fn inspect(mesh: &TriMesh) -> MeshReport {
     let (mut non_manifold_edges, mut inconsistent_edges) = (0, 0);
     for (ends, sides) in edges.iter() {
         match sides {
-            [_] => boundary.push(ends),
+            // In the triangle's own direction, so that the edges of a hole run round it.
+            [side] if side.upward => boundary.push(ends),
+            [_] => boundary.push([ends[1], ends[0]]),
             [one, other] => inconsistent_edges += usize::from(one.upward == other.upward),
             _ => non_manifold_edges += 1,
         }
     }
-    let hole_perimeters = perimeters(mesh, &boundary);
+    let holes = holes(mesh, &boundary);
     let degenerate_triangles = triangles.iter().filter(|t| is_collapsed(**t)).count();
     MeshReport {
         watertight: boundary.is_empty() && non_manifold_edges == 0 && degenerate_triangles < triangles.len(),
@@ -50,37 +62,32 @@ pub fn inspect(mesh: &TriMesh) -> MeshReport {
         inconsistent_edges,
         degenerate_triangles,
         n_components: components(&triangles, &edges).len(),
-        n_holes: hole_perimeters.len(),
-        hole_perimeters,
+        n_holes: holes.len(),
+        holes,
     }
 }
 
-/// Length of each group of edges that hang together, longest first.
-fn perimeters(mesh: &TriMesh, boundary: &[[u32; 2]]) -> Vec<f64> {
-    let mut first_edge_at = BTreeMap::new();
-    let mut groups = Groups::new(boundary.len());
-    for (edge, ends) in boundary.iter().enumerate() {
-        for end in ends {
-            groups.join(edge, *first_edge_at.entry(end).or_insert(edge));
+/// What each chain of boundary edges goes round, longest first.
+fn holes(mesh: &TriMesh, boundary: &[[u32; 2]]) -> Vec<Hole> {
+    let at = |v: u32| mesh.vertices()[v as usize];
+    let measure = |chain: Vec<[u32; 2]>| {
+        let middle: Point3<f64> = at(chain[0][0]);
+        let ends = chain.iter().map(|edge| edge.map(|v| at(v) - middle));
+        // The area vector of a closed loop does not depend on the point that it is taken about.
+        let area: Vector3<f64> = ends.clone().map(|[from, to]| from.cross(&to) / 2.0).sum();
+        Hole {
+            edges: chain.len(),
+            perimeter: ends.map(|[from, to]| (to - from).norm()).sum(),
+            area: area.norm(),
         }
-    }
-    let length = |edge: usize| {
-        let [a, b] = boundary[edge].map(|v| mesh.vertices()[v as usize]);
-        (b - a).norm()
     };
-    let mut perimeters: Vec<f64> = groups
-        .members(|_| true)
-        .iter()
-        .map(|hole| hole.iter().map(|&edge| length(edge)).sum())
-        .collect();
-    perimeters.sort_by(|a, b| b.total_cmp(a));
-    perimeters
+    let mut holes: Vec<Hole> = chains(boundary).into_iter().map(measure).collect();
+    holes.sort_by(|a, b| b.perimeter.total_cmp(&a.perimeter));
+    holes
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Point3;
-
     use super::*;
     use crate::repair::tests::cube;
 
@@ -94,7 +101,7 @@ mod tests {
             degenerate_triangles: 0,
             n_components: 1,
             n_holes: 0,
-            hole_perimeters: vec![],
+            holes: vec![],
         };
         let cube = cube(1.0);
         assert_eq!(inspect(&cube), expected);
@@ -113,7 +120,12 @@ mod tests {
             (report.watertight, report.boundary_edges, report.n_holes),
             (false, 8, 2)
         );
-        assert_eq!(report.hole_perimeters, [2.0, 2.0]);
+        let hole = Hole {
+            edges: 4,
+            perimeter: 2.0,
+            area: 0.25,
+        };
+        assert_eq!(report.holes, [hole, hole]);
     }
 
     #[test]

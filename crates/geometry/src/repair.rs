@@ -1,12 +1,12 @@
 //! What can be mended in a mesh without guessing.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::TriMesh;
-use crate::topology::{Edges, Groups, components, is_collapsed, position_triangles};
+use crate::topology::{Edges, chains, components, is_collapsed, position_triangles, rim as open_rim};
 
 /// A part counts as a body, with an inside and an outside, if its volume exceeds this share of area^{3/2}. For a ball
 /// the share is 0.094, for a blade a hundred times as long and wide as thick 0.003.
@@ -130,14 +130,7 @@ fn turn_outward(vertices: &[Point3<f64>], triangles: &mut [[u32; 3]]) -> usize {
     }
     let mut rims = vec![Vec::new(); members.len()];
     for (ends, sides) in edges.iter() {
-        // Sides that run up and down in equal number close the surface; what is left over is the rim of a hole.
-        let surplus = sides
-            .iter()
-            .map(|side| if side.upward { 1 } else { -1 })
-            .sum::<i64>();
-        let rim = if surplus > 0 { ends } else { [ends[1], ends[0]] };
-        rims[component_of[sides[0].triangle]]
-            .extend(std::iter::repeat_n(rim, surplus.unsigned_abs() as usize));
+        rims[component_of[sides[0].triangle]].extend(open_rim(ends, sides));
     }
     let parts: Vec<Part> = members
         .into_iter()
@@ -192,7 +185,7 @@ impl Part {
             .iter()
             .map(|[a, b, c]| (b - a).cross(&(c - a)).norm() / 2.0)
             .sum();
-        for hole in holes(rim) {
+        for hole in chains(rim) {
             let ends = hole.iter().map(|edge| edge.map(|v| vertices[v as usize]));
             let sum: Vector3<f64> = ends.clone().map(|[from, _]| from - first).sum();
             let middle = first + sum / hole.len() as f64;
@@ -250,22 +243,6 @@ impl Part {
         });
         angles.sum::<f64>() / (4.0 * std::f64::consts::PI)
     }
-}
-
-/// Rim edges by the hole that they go round.
-fn holes(rim: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
-    let mut first_edge_at = BTreeMap::new();
-    let mut groups = Groups::new(rim.len());
-    for (edge, ends) in rim.iter().enumerate() {
-        for end in ends {
-            groups.join(edge, *first_edge_at.entry(end).or_insert(edge));
-        }
-    }
-    groups
-        .members(|_| true)
-        .into_iter()
-        .map(|hole| hole.into_iter().map(|edge| rim[edge]).collect())
-        .collect()
 }
 
 fn count_referenced(mesh: &TriMesh) -> usize {

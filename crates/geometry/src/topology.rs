@@ -148,3 +148,27 @@ pub(crate) fn components(triangles: &[[u32; 3]], edges: &Edges) -> Vec<Vec<usize
     }
     groups.members(|triangle| !is_collapsed(triangles[triangle]))
 }
+
+/// Edges by the chain that they hang together in, in the order of each chain's first edge.
+pub(crate) fn chains(edges: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
+    let mut first_edge_at = BTreeMap::new();
+    let mut groups = Groups::new(edges.len());
+    for (edge, ends) in edges.iter().enumerate() {
+        for end in ends {
+            groups.join(edge, *first_edge_at.entry(end).or_insert(edge));
+        }
+    }
+    groups
+        .members(|_| true)
+        .into_iter()
+        .map(|chain| chain.into_iter().map(|edge| edges[edge]).collect())
+        .collect()
+}
+
+/// The rim of what an edge leaves open: its ends, in the direction of the surplus, once for each triangle that has no
+/// counterpart. Sides that run up and down in equal number close the surface.
+pub(crate) fn rim(ends: [u32; 2], sides: &[Side]) -> impl Iterator<Item = [u32; 2]> + use<> {
+    let surplus: i64 = sides.iter().map(|side| if side.upward { 1 } else { -1 }).sum();
+    let rim = if surplus > 0 { ends } else { [ends[1], ends[0]] };
+    std::iter::repeat_n(rim, surplus.unsigned_abs() as usize)
+}
