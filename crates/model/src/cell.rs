@@ -14,13 +14,13 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::cpd::Weights;
-use crate::cpd::{Sign, n_mixture_parameters};
+use crate::cpd::{Sign, Weights, n_mixture_parameters};
 use crate::cross_validation::{HeldOut, best_held_out, choose_priors, cross_validate, mean};
-use crate::em::{CovariancePrior, Mixing, RIDGE, Rows};
-use crate::family::Family;
+use crate::em::{Rows, expect};
+use crate::family::{Cells, Family};
+use crate::moments::{CovariancePrior, Mixing, Moment, RIDGE, Settings};
 use crate::network::{MixtureOrder, MixtureSpec};
-use crate::start::{FitOptions, Robust, fit_mixture};
+use crate::start::{FitOptions, Robust, fit_orders};
 use crate::train::TrainOptions;
 
 /// BIC differences below this are no evidence; the smaller mixture wins.
@@ -31,9 +31,10 @@ const ROWS_PER_PARAMETER: f64 = 2.0;
 /// What to fit.
 pub(crate) struct CellTask<'a> {
     pub node: usize,
-    /// Configuration of the discrete parents; `None` takes all rows.
+    /// Configuration of the discrete parents; `None` takes all, which share something.
     pub cell: Option<usize>,
     pub spec: &'a MixtureSpec,
+    pub cells: &'a Cells,
     pub family: &'a Family,
     pub options: TrainOptions,
     pub grouped: bool,
@@ -43,6 +44,12 @@ pub(crate) struct CellTask<'a> {
 pub(crate) struct FittedCell {
     pub cell: Option<usize>,
     pub mixing: Mixing,
+    /// Complete rows.
+    pub rows: Rows,
+    /// Expected moments of each configuration and component under `mixing`.
+    pub moments: Vec<Vec<Moment>>,
+    /// What a row's weight counts here.
+    pub scale: f64,
     pub report: CellReport,
     pub warnings: Vec<String>,
 }
@@ -119,23 +126,18 @@ pub(crate) fn fit_cells(tasks: &[CellTask]) -> Vec<FittedCell> {
         .par_iter()
         .map(|task| choose_priors(task, Prepared::new(task)))
         .collect();
-    let jobs: Vec<(usize, usize)> = prepared
-        .iter()
-        .enumerate()
-        .flat_map(|(i, cell)| cell.orders.iter().map(move |&k| (i, k)))
-        .collect();
-    // Longest first keeps all threads busy to the end; results come back in the jobs' order.
-    let mut order: Vec<usize> = (0..jobs.len()).collect();
-    order.sort_by_key(|&j| std::cmp::Reverse(prepared[jobs[j].0].rows.n() * jobs[j].1));
-    let fits = in_order(&order, |j| {
-        let (i, k) = jobs[j];
-        let mut rng = stream(&tasks[i], k, 0);
-        fit_mixture(&prepared[i].rows, k, fit_options(&tasks[i].options), &mut rng)
+    // Longest first keeps all threads busy to the end; results come back in the tasks' order.
+    let mut order: Vec<usize> = (0..tasks.len()).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(prepared[i].rows.n() * prepared[i].orders.len()));
+    let fits_of = in_order(&order, |i| {
+        let rng = |k| stream(&tasks[i], k, 0);
+        fit_orders(
+            &prepared[i].rows,
+            &prepared[i].orders,
+            fit_options(&tasks[i].options),
+            rng,
+        )
     });
-    let mut fits_of: Vec<Vec<(usize, Robust)>> = prepared.iter().map(|_| Vec::new()).collect();
-    for ((i, k), fit) in jobs.into_iter().zip(fits) {
-        fits_of[i].push((k, fit));
-    }
     let chosen: Vec<usize> = prepared
         .iter()
         .zip(&fits_of)
@@ -185,6 +187,7 @@ pub(crate) struct Prepared {
     pub groups: Option<Vec<usize>>,
     n_rows: usize,
     pub n_effective: f64,
+    scale: f64,
     constant: bool,
     pooled: bool,
     orders: Vec<usize>,
@@ -193,38 +196,71 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     fn new(task: &CellTask) -> Self {
-        let family = task.family;
-        let members: Vec<usize> = (0..family.rows.len())
-            .filter(|&i| task.cell.is_none_or(|cell| family.configurations[i] == cell))
-            .collect();
-        let n_rows = members.len();
-        let own = Self::of(task, &members);
-        let enough = own.n_effective >= own.rows.least_mass() || task.cell.is_none();
-        let mut prepared = own;
+        let mut prepared = Self::of(task, task.cell);
+        let n_rows = prepared.rows.n();
+        let enough = prepared.n_effective >= prepared.rows.settings.least_mass() || task.cell.is_none();
         if !enough {
             let found = prepared.n_effective;
-            let least = prepared.rows.least_mass();
+            let least = prepared.rows.settings.least_mass();
             let what = if prepared.constant { "groups" } else { "rows" };
-            prepared = Self::of(task, &(0..family.rows.len()).collect::<Vec<_>>());
+            prepared = Self::of(task, None);
             prepared.pooled = true;
             prepared.orders = vec![1];
             prepared.warnings = vec![format!(
                 "{found} {what} are too few for {least} unknowns; took one component over all configurations"
             )];
         }
+        if task.family.with_gaps {
+            prepared
+                .warnings
+                .push("hardly a row is complete; EM starts with gaps filled by the columns' means".into());
+        }
         prepared.n_rows = n_rows;
         prepared
     }
 
-    fn of(task: &CellTask, members: &[usize]) -> Self {
-        let (family, spec) = (task.family, task.spec);
+    fn of(task: &CellTask, configuration: Option<usize>) -> Self {
+        let (family, spec, cells) = (task.family, task.spec, task.cells);
         let d = spec.columns.len();
-        let q = family.parent_scaling.mean.len();
+        let range = family.members(configuration);
+        let members = &family.rows[range.clone()];
         let groups: Option<Vec<usize>> = family
             .groups
             .as_ref()
-            .map(|groups| members.iter().map(|&i| groups[i]).collect());
-        let mut weights: Vec<f64> = members.iter().map(|&i| family.weights[i]).collect();
+            .map(|groups| groups[range.clone()].to_vec());
+        let mut weights: Vec<f64> = members.iter().map(|&row| cells.weights[row]).collect();
+        let parents: Vec<&Vec<f64>> = family.parents.iter().flat_map(|&i| &cells.values[i]).collect();
+        let q = parents.len();
+        let mut z = Vec::with_capacity(members.len() * (d + 1 + q));
+        // Gaps are here only where hardly a row is complete: the mean, 0, is where EM starts.
+        let filled = |value: f64| if value.is_nan() { 0.0 } else { value };
+        for &row in members {
+            z.extend(cells.values[task.node].iter().map(|column| filled(column[row])));
+            z.push(1.0);
+            z.extend(parents.iter().map(|column| filled(column[row])));
+        }
+        let floor = spec
+            .noise_floor
+            .iter()
+            .zip(&cells.scaling[task.node].standard_deviation)
+            .map(|(f, s)| f / s)
+            .collect();
+        // Pooled cells are a stand-in and share nothing; one configuration alone neither.
+        let together = configuration.is_none() && task.cell.is_none();
+        let settings = Settings {
+            d,
+            q,
+            weights: if together {
+                spec.weights
+            } else {
+                Weights::PerConfiguration
+            },
+            tied: spec.shared_covariance,
+            floor,
+            latent_sign: spec.sign == Sign::Latent,
+            ridge: vec![RIDGE; 1 + q],
+            prior: CovariancePrior::WEAK,
+        };
         let total: f64 = weights.iter().sum();
         let squares: f64 = weights.iter().map(|w| w * w).sum();
         let mut n_effective = if squares > 0.0 {
@@ -232,7 +268,8 @@ impl Prepared {
         } else {
             0.0
         };
-        let values: Vec<&Vec<f64>> = members.iter().map(|&i| &family.y[i]).collect();
+        let m = settings.m();
+        let values: Vec<&[f64]> = z.chunks_exact(m).map(|row| &row[..d]).collect();
         let constant = groups.as_ref().is_some_and(|groups| is_constant(&values, groups));
         let mut warnings = Vec::new();
         if constant {
@@ -246,48 +283,28 @@ impl Prepared {
                     .into(),
             );
         }
-        if total > 0.0 {
-            for weight in &mut weights {
-                *weight *= n_effective / total;
-            }
+        let scale = if total > 0.0 { n_effective / total } else { 1.0 };
+        for weight in &mut weights {
+            *weight *= scale;
         }
-        let z = faer::Mat::from_fn(d + 1 + q, members.len(), |i, j| {
-            let row = members[j];
-            match i {
-                _ if i < d => family.y[row][i],
-                _ if i == d => 1.0,
-                _ => family.p[row][i - d - 1],
-            }
-        });
-        let shared = spec.weights == Weights::Shared && task.cell.is_none();
-        let cell = members
-            .iter()
-            .map(|&i| if shared { family.configurations[i] } else { 0 })
-            .collect();
-        let floor = spec
-            .noise_floor
-            .iter()
-            .zip(&family.scaling.standard_deviation)
-            .map(|(f, s)| f / s)
-            .collect();
+        let ends = if together {
+            family.ends.clone()
+        } else {
+            vec![members.len()]
+        };
         let rows = Rows {
-            d,
+            settings,
             z,
             weights,
-            cell,
-            n_cells: if shared { family.n_configurations } else { 1 },
-            floor,
-            latent_sign: spec.sign == Sign::Latent,
-            ridge: vec![RIDGE; 1 + q],
-            prior: CovariancePrior::WEAK,
+            ends,
         };
         let orders = orders(spec, &rows, n_effective, constant);
-        let n_rows = rows.n();
         Self {
+            n_rows: rows.n(),
             rows,
             groups,
-            n_rows,
             n_effective,
+            scale,
             constant,
             pooled: false,
             orders,
@@ -298,21 +315,30 @@ impl Prepared {
 
 /// Numbers of components to try.
 fn orders(spec: &MixtureSpec, rows: &Rows, n_effective: f64, constant: bool) -> Vec<usize> {
-    let one = n_mixture_parameters(1, rows.d, rows.q()) as f64;
-    let per_component = if constant {
-        rows.least_mass()
+    let settings = &rows.settings;
+    let one = n_mixture_parameters(1, settings.d, settings.q) as f64;
+    // Configurations with Gaussians of their own need rows each.
+    let sets = if settings.weights == Weights::Shared {
+        1
     } else {
-        (ROWS_PER_PARAMETER * one).max(rows.least_mass())
+        rows.ends.len()
+    };
+    let least = settings.least_mass();
+    let n_effective = n_effective / sets as f64;
+    let per_component = if constant {
+        least
+    } else {
+        (ROWS_PER_PARAMETER * one).max(least)
     };
     let most = ((n_effective / per_component) as usize).max(1);
     match spec.order {
-        MixtureOrder::Fixed(k) => vec![k.min(((n_effective / rows.least_mass()) as usize).max(1))],
+        MixtureOrder::Fixed(k) => vec![k.min(((n_effective / least) as usize).max(1))],
         MixtureOrder::Bic { max, .. } => (1..=max.min(most)).collect(),
     }
 }
 
 /// Whether every group has one value, and some group has several rows.
-fn is_constant(values: &[&Vec<f64>], groups: &[usize]) -> bool {
+fn is_constant(values: &[&[f64]], groups: &[usize]) -> bool {
     let mut first = std::collections::BTreeMap::new();
     for (value, group) in values.iter().zip(groups) {
         let known = *first.entry(*group).or_insert(*value);
@@ -325,7 +351,7 @@ fn is_constant(values: &[&Vec<f64>], groups: &[usize]) -> bool {
 }
 
 /// Whether rows outnumber distinct values three to one.
-fn repeats(values: &[&Vec<f64>]) -> bool {
+fn repeats(values: &[&[f64]]) -> bool {
     let distinct: std::collections::BTreeSet<Vec<u64>> = values
         .iter()
         .map(|value| value.iter().map(|v| v.to_bits()).collect())
@@ -334,9 +360,8 @@ fn repeats(values: &[&Vec<f64>]) -> bool {
 }
 
 fn score(cell: &Prepared, asked: usize, fit: &Robust) -> OrderScore {
-    let components = fit.fit.mixing.components.len();
-    let gaussians = n_mixture_parameters(components, cell.rows.d, cell.rows.q()) - (components - 1);
-    let n_parameters = gaussians + cell.rows.n_cells * (components - 1);
+    let components = fit.fit.mixing.k();
+    let n_parameters = cell.rows.settings.n_parameters(components, cell.rows.ends.len());
     let log_likelihood = fit.fit.log_likelihood;
     let bic = -2.0 * log_likelihood + n_parameters as f64 * cell.n_effective.max(1.0).ln();
     OrderScore {
@@ -372,7 +397,7 @@ fn conclude(
         best = best_held_out(held_out);
     }
     let (asked, chosen) = fits.swap_remove(best);
-    let components = chosen.fit.mixing.components.len();
+    let components = chosen.fit.mixing.k();
     let mut warnings = cell.warnings;
     if chosen.dropped > 0 && matches!(task.spec.order, MixtureOrder::Fixed(_)) {
         warnings.push(format!(
@@ -408,9 +433,25 @@ fn conclude(
         pooled: cell.pooled,
         objectives: chosen.fit.objectives,
     };
+    let rows = if task.family.with_gaps {
+        let place = if cell.pooled { None } else { task.cell };
+        let start = task.family.members(place).start;
+        let known = |&i: &usize| {
+            let mut family = task.family.parents.iter().chain([&task.node]);
+            family.all(|&node| task.cells.is_known(node, task.family.rows[start + i]))
+        };
+        cell.rows
+            .select(&(0..cell.rows.n()).filter(known).collect::<Vec<_>>())
+    } else {
+        cell.rows
+    };
+    let (_, moments) = expect(&rows, &chosen.fit.mixing);
     FittedCell {
         cell: task.cell,
         mixing: chosen.fit.mixing,
+        rows,
+        moments,
+        scale: cell.scale,
         report,
         warnings,
     }

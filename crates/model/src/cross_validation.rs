@@ -3,7 +3,8 @@
 use rand::seq::SliceRandom;
 
 use crate::cell::{CellTask, Prepared, fit_options, in_order, stream};
-use crate::em::{CovariancePrior, RIDGE, row_log_densities};
+use crate::em::row_log_densities;
+use crate::moments::{CovariancePrior, RIDGE};
 use crate::network::MixtureOrder;
 use crate::start::{FitOptions, Robust, fit_mixture};
 
@@ -90,7 +91,7 @@ pub(crate) fn choose_priors(task: &CellTask, mut cell: Prepared) -> Prepared {
     };
     if held_back.iter().any(|constant| *constant) {
         try_all(&mut cell, RIDGES.len(), &|cell, choice| {
-            for (ridge, constant) in cell.rows.ridge[1..].iter_mut().zip(&held_back) {
+            for (ridge, constant) in cell.rows.settings.ridge[1..].iter_mut().zip(&held_back) {
                 *ridge = RIDGE
                     + if *constant {
                         RIDGES[choice] * one_group
@@ -101,7 +102,7 @@ pub(crate) fn choose_priors(task: &CellTask, mut cell: Prepared) -> Prepared {
         });
     }
     try_all(&mut cell, DEVIATIONS.len(), &|cell, choice| {
-        cell.rows.prior = if DEVIATIONS[choice] > 0.0 {
+        cell.rows.settings.prior = if DEVIATIONS[choice] > 0.0 {
             CovariancePrior {
                 rows: one_group,
                 deviation: DEVIATIONS[choice],
@@ -116,11 +117,12 @@ pub(crate) fn choose_priors(task: &CellTask, mut cell: Prepared) -> Prepared {
 /// For each parent whether it has one value in each group.
 fn parents_constant_in_groups(cell: &Prepared) -> Vec<bool> {
     let groups = cell.groups.as_deref().unwrap_or(&[]);
-    (0..cell.rows.q())
+    let settings = &cell.rows.settings;
+    (0..settings.q)
         .map(|parent| {
             let mut first = std::collections::BTreeMap::new();
             groups.iter().enumerate().all(|(row, group)| {
-                let value = cell.rows.z[(cell.rows.d + 1 + parent, row)];
+                let value = cell.rows.row(row)[settings.d + 1 + parent];
                 let known: f64 = *first.entry(*group).or_insert(value);
                 (known - value).abs() <= 1e-5
             })
@@ -162,6 +164,7 @@ fn held_out(task: &CellTask, cell: &Prepared, fold: &[usize], k: usize, number: 
     let fit = fit_mixture(
         &cell.rows.select(&train),
         k,
+        None,
         options,
         &mut stream(task, k, number + 1),
     );

@@ -2,86 +2,31 @@
 //!
 //! ```text
 //! y | p ~ Σₖ πₖ N(Bₖ [1, p], Σₖ)
-//! J = Σᵢ wᵢ log p(yᵢ | pᵢ) + Σₖ [ log πₖ / K − ½ ν log|Σₖ| − ½ tr Σₖ⁻¹ (ν s² I + Bₖ E Bₖᵀ) ]
 //! ```
 //!
-//! J is the logarithm of a posterior density up to a constant, and both steps are exact maximizers, so J never falls.
-//! The noise floor is the constraint Σₖ ⪰ diag(floor²), whose maximizer clips eigenvalues in units of the floor.
-//! The products over all rows go through faer; what is d × d stays with plain loops.
+//! One pass over the rows, in blocks that stay in the cache, gives the log-likelihood and the moments that the M-step
+//! (`moments.rs`) needs; nothing of the size of the data is stored. The two products of a block go through faer.
 
-use faer::{Accum, Mat, Par, linalg::matmul::matmul};
-use nalgebra::{DMatrix, DVector};
+use faer::{Accum, MatMut, MatRef, Par, linalg::matmul::matmul};
+use nalgebra::DMatrix;
 
-use crate::gaussian::{LOG_TAU, cholesky, log_sum_exp, solve_lower, solve_lower_transpose, symmetrize};
+use crate::gaussian::{LOG_TAU, cholesky, solve_lower};
+use crate::moments::{Mixing, Moment, Regression, Settings, log_prior, maximize};
 
-/// Least ridge of the regressions: it only decides between equal fits.
-pub(crate) const RIDGE: f64 = 1e-6;
+/// Rows of a block: white residuals and products of 256 rows fit into the second-level cache.
+const BLOCK: usize = 256;
+/// What rounding may take from J in one step, in shares of J.
+const ROUNDING: f64 = 1e-7;
 
-/// Prior of a component's covariance: `rows` pseudo-rows (ν), each `deviation` (s) away from the mean, in units of the
-/// column's standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CovariancePrior {
-    pub rows: f64,
-    pub deviation: f64,
-}
-
-impl CovariancePrior {
-    /// Keeps a component off a single point, and no more.
-    pub const WEAK: Self = Self {
-        rows: 1.0,
-        deviation: 0.01,
-    };
-
-    fn scatter(self) -> f64 {
-        self.rows * self.deviation * self.deviation
-    }
-}
-
-/// Standardised rows of one cell: what one mixture is fitted to.
+/// Standardised rows: what one mixture is fitted to.
 pub(crate) struct Rows {
-    /// Dimension of y.
-    pub d: usize,
-    /// (d + 1 + q) × n: y, 1, p.
-    pub z: Mat<f64>,
+    pub settings: Settings,
+    /// (y, 1, p) row after row.
+    pub z: Vec<f64>,
     /// Weight of each row.
     pub weights: Vec<f64>,
-    /// Which mixing weights each row uses.
-    pub cell: Vec<usize>,
-    /// How many sets of mixing weights there are.
-    pub n_cells: usize,
-    /// Smallest standard deviation of each dimension of y.
-    pub floor: Vec<f64>,
-    /// Whether y and −y are the same.
-    pub latent_sign: bool,
-    /// Diagonal of E: ridge of the intercept and of each parent.
-    pub ridge: Vec<f64>,
-    /// Prior of the covariances.
-    pub prior: CovariancePrior,
-}
-
-/// One component in standardised units.
-#[derive(Debug, Clone)]
-pub(crate) struct Regression {
-    /// d × (1 + q): intercept and slopes.
-    pub slopes: DMatrix<f64>,
-    /// d × d.
-    pub covariance: DMatrix<f64>,
-}
-
-/// Parameters of a mixture.
-#[derive(Debug, Clone)]
-pub(crate) struct Mixing {
-    /// log πₖ for each cell.
-    pub log_weights: Vec<Vec<f64>>,
-    pub components: Vec<Regression>,
-}
-
-/// Posterior probability of each component (and sign) for each row.
-pub(crate) struct Responsibilities {
-    /// n × K: both signs together.
-    pub total: Vec<Vec<f64>>,
-    /// n × K: plus minus minus; empty without a latent sign.
-    pub signed: Vec<Vec<f64>>,
+    /// End of each configuration's rows: rows are sorted by configuration.
+    pub ends: Vec<usize>,
 }
 
 /// A fit and how it came about.
@@ -90,6 +35,8 @@ pub(crate) struct Fit {
     pub mixing: Mixing,
     /// Σ wᵢ log p, without the priors.
     pub log_likelihood: f64,
+    /// Mass of each component, all configurations together.
+    pub masses: Vec<f64>,
     /// J after each step.
     pub objectives: Vec<f64>,
     pub converged: bool,
@@ -97,306 +44,348 @@ pub(crate) struct Fit {
 
 impl Rows {
     pub fn n(&self) -> usize {
-        self.z.ncols()
+        self.weights.len()
     }
-    pub fn q(&self) -> usize {
-        self.z.nrows() - self.d - 1
+    /// (y, 1, p) of a row.
+    pub fn row(&self, i: usize) -> &[f64] {
+        let m = self.settings.m();
+        &self.z[i * m..(i + 1) * m]
     }
     pub fn total_weight(&self) -> f64 {
         self.weights.iter().sum()
     }
-    /// Least mass that carries one component: as many rows as unknowns per output, and one more.
-    pub fn least_mass(&self) -> f64 {
-        (self.d + self.q() + 2) as f64
+    /// Rows of a configuration.
+    pub fn cell(&self, cell: usize) -> std::ops::Range<usize> {
+        let start = if cell == 0 { 0 } else { self.ends[cell - 1] };
+        start..self.ends[cell]
     }
-    /// The given rows.
+    /// The given rows, in rising order.
     pub fn select(&self, rows: &[usize]) -> Self {
         Self {
-            d: self.d,
-            z: Mat::from_fn(self.z.nrows(), rows.len(), |i, j| self.z[(i, rows[j])]),
+            settings: self.settings.clone(),
+            z: rows.iter().flat_map(|&i| self.row(i)).copied().collect(),
             weights: rows.iter().map(|&i| self.weights[i]).collect(),
-            cell: rows.iter().map(|&i| self.cell[i]).collect(),
-            n_cells: self.n_cells,
-            floor: self.floor.clone(),
-            latent_sign: self.latent_sign,
-            ridge: self.ridge.clone(),
-            prior: self.prior,
+            ends: self
+                .ends
+                .iter()
+                .map(|&end| rows.partition_point(|&i| i < end))
+                .collect(),
         }
     }
 }
 
+/// A component as it acts on z: the white residual is `white` z, the log density `constant` − ½ |white z|².
+pub(crate) struct Acting {
+    pub component: usize,
+    /// −1 where −y belongs to the component.
+    pub sign: f64,
+    pub constant: f64,
+    /// d × m.
+    pub white: DMatrix<f64>,
+}
+
+/// The components with their log weights; with a latent sign each one twice.
+pub(crate) fn acting(settings: &Settings, log_weights: &[f64], components: &[Regression]) -> Vec<Acting> {
+    let (d, m) = (settings.d, settings.m());
+    let signs: &[f64] = if settings.latent_sign {
+        &[1.0, -1.0]
+    } else {
+        &[1.0]
+    };
+    let share = -(signs.len() as f64).ln();
+    let mut out = Vec::with_capacity(signs.len() * components.len());
+    for &sign in signs {
+        for (c, component) in components.iter().enumerate() {
+            let lower = cholesky(&component.covariance).unwrap_or_else(|| DMatrix::identity(d, d));
+            let mut residual = DMatrix::zeros(d, m);
+            residual.fill_diagonal(sign);
+            residual.columns_mut(d, m - d).copy_from(&(-&component.slopes));
+            let log_root: f64 = (0..d).map(|i| lower[(i, i)].ln()).sum();
+            out.push(Acting {
+                component: c,
+                sign,
+                constant: log_weights[c] + share - 0.5 * d as f64 * LOG_TAU - log_root,
+                white: solve_lower(&lower, &residual),
+            });
+        }
+    }
+    out
+}
+
+/// Stacked white maps of several acting components, and the buffer for their residuals.
+struct Stack {
+    d: usize,
+    maps: Vec<f64>,
+    constants: Vec<f64>,
+    residuals: Vec<f64>,
+}
+
+impl Stack {
+    fn new(d: usize, m: usize, acting: &[Acting]) -> Self {
+        let rows = d * acting.len();
+        let mut maps = vec![0.0; rows * m];
+        for (a, part) in acting.iter().enumerate() {
+            for j in 0..m {
+                for i in 0..d {
+                    maps[j * rows + a * d + i] = part.white[(i, j)];
+                }
+            }
+        }
+        Self {
+            d,
+            maps,
+            constants: acting.iter().map(|part| part.constant).collect(),
+            residuals: vec![0.0; rows * BLOCK],
+        }
+    }
+
+    /// Log densities of the block's rows: all components of the first row, of the second …
+    fn log_densities(&mut self, z: &[f64], n: usize, out: &mut Vec<f64>) {
+        let a = self.constants.len();
+        let (rows, m) = (self.d * a, z.len() / n);
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut self.residuals[..rows * n], rows, n),
+            Accum::Replace,
+            MatRef::from_column_major_slice(&self.maps, rows, m),
+            MatRef::from_column_major_slice(z, m, n),
+            1.0,
+            Par::Seq,
+        );
+        out.clear();
+        for residuals in self.residuals[..rows * n].chunks_exact(rows) {
+            let squares = residuals
+                .chunks_exact(self.d)
+                .map(|part| part.iter().map(|r| r * r).sum::<f64>());
+            out.extend(
+                squares
+                    .zip(&self.constants)
+                    .map(|(square, constant)| constant - 0.5 * square),
+            );
+        }
+    }
+}
+
+/// Turns log densities into shares of their sum, and returns the logarithm of the sum.
+fn normalize(logs: &mut [f64]) -> f64 {
+    let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if max == f64::NEG_INFINITY {
+        logs.fill(1.0 / logs.len() as f64);
+        return max;
+    }
+    let mut sum = 0.0;
+    for log in logs.iter_mut() {
+        *log = (*log - max).exp();
+        sum += *log;
+    }
+    for share in logs.iter_mut() {
+        *share /= sum;
+    }
+    max + sum.ln()
+}
+
+/// Sums responsibilities times z zᵀ, block by block.
+pub(crate) struct Gatherer {
+    d: usize,
+    m: usize,
+    n_components: usize,
+    products: Vec<f64>,
+    shares: Vec<f64>,
+    signed: Vec<f64>,
+    packed: Vec<f64>,
+    packed_signed: Vec<f64>,
+    masses: Vec<f64>,
+}
+
+impl Gatherer {
+    pub fn new(settings: &Settings, n_components: usize) -> Self {
+        let m = settings.m();
+        let t = m * (m + 1) / 2;
+        let both = usize::from(settings.latent_sign);
+        Self {
+            d: settings.d,
+            m,
+            n_components,
+            products: vec![0.0; t * BLOCK],
+            shares: vec![0.0; n_components * BLOCK],
+            signed: vec![0.0; both * n_components * BLOCK],
+            packed: vec![0.0; t * n_components],
+            packed_signed: vec![0.0; both * t * n_components],
+            masses: vec![0.0; n_components],
+        }
+    }
+
+    /// One block; `share` gives plus and minus shares of a row for a component, times its weight.
+    fn add(&mut self, z: &[f64], n: usize, share: impl Fn(usize, usize) -> (f64, f64)) {
+        let (m, k) = (self.m, self.n_components);
+        let t = m * (m + 1) / 2;
+        for (row, out) in z.chunks_exact(m).zip(self.products.chunks_exact_mut(t)) {
+            let mut at = 0;
+            for i in 0..m {
+                let scale = row[i];
+                for (out, other) in out[at..at + m - i].iter_mut().zip(&row[i..]) {
+                    *out = scale * other;
+                }
+                at += m - i;
+            }
+        }
+        for c in 0..k {
+            for b in 0..n {
+                let (plus, minus) = share(b, c);
+                self.shares[c * n + b] = plus + minus;
+                self.masses[c] += plus + minus;
+                if !self.signed.is_empty() {
+                    self.signed[c * n + b] = plus - minus;
+                }
+            }
+        }
+        let gather = |packed: &mut [f64], shares: &[f64]| {
+            matmul(
+                MatMut::from_column_major_slice_mut(packed, t, k),
+                Accum::Add,
+                MatRef::from_column_major_slice(&self.products[..t * n], t, n),
+                MatRef::from_column_major_slice(&shares[..k * n], n, k),
+                1.0,
+                Par::Seq,
+            );
+        };
+        gather(&mut self.packed, &self.shares);
+        if !self.signed.is_empty() {
+            gather(&mut self.packed_signed, &self.signed);
+        }
+    }
+
+    fn finish(self) -> Vec<Moment> {
+        let t = self.m * (self.m + 1) / 2;
+        (0..self.n_components)
+            .map(|c| {
+                let mut product = DMatrix::zeros(self.m, self.m);
+                let mut at = c * t;
+                for i in 0..self.m {
+                    for j in i..self.m {
+                        let between = i < self.d && j >= self.d && !self.packed_signed.is_empty();
+                        let value = if between {
+                            self.packed_signed[at]
+                        } else {
+                            self.packed[at]
+                        };
+                        product[(i, j)] = value;
+                        product[(j, i)] = value;
+                        at += 1;
+                    }
+                }
+                Moment {
+                    mass: self.masses[c],
+                    product,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The E-step: Σ wᵢ log p, and the moments of each configuration and component.
+pub(crate) fn expect(rows: &Rows, mixing: &Mixing) -> (f64, Vec<Vec<Moment>>) {
+    let (settings, k) = (&rows.settings, mixing.k());
+    let m = settings.m();
+    let mut log_likelihood = 0.0;
+    let mut logs = Vec::new();
+    let moments = (0..rows.ends.len())
+        .map(|cell| {
+            let parts = acting(settings, &mixing.log_weights[cell], mixing.set(cell));
+            let a = parts.len();
+            let mut stack = Stack::new(settings.d, m, &parts);
+            let mut gatherer = Gatherer::new(settings, k);
+            let range = rows.cell(cell);
+            for start in range.clone().step_by(BLOCK) {
+                let n = BLOCK.min(range.end - start);
+                let z = &rows.z[start * m..(start + n) * m];
+                stack.log_densities(z, n, &mut logs);
+                let weights = &rows.weights[start..start + n];
+                for (logs, weight) in logs.chunks_exact_mut(a).zip(weights) {
+                    log_likelihood += weight * normalize(logs);
+                }
+                gatherer.add(z, n, |b, c| {
+                    let minus = if a > k { logs[b * a + k + c] } else { 0.0 };
+                    (weights[b] * logs[b * a + c], weights[b] * minus)
+                });
+            }
+            gatherer.finish()
+        })
+        .collect();
+    (log_likelihood, moments)
+}
+
+/// Moments of rows with given shares: plus and minus shares of row and component.
+pub(crate) fn gather(rows: &Rows, k: usize, share: impl Fn(usize, usize) -> (f64, f64)) -> Vec<Vec<Moment>> {
+    let m = rows.settings.m();
+    (0..rows.ends.len())
+        .map(|cell| {
+            let mut gatherer = Gatherer::new(&rows.settings, k);
+            let range = rows.cell(cell);
+            for start in range.clone().step_by(BLOCK) {
+                let n = BLOCK.min(range.end - start);
+                gatherer.add(&rows.z[start * m..(start + n) * m], n, |b, c| {
+                    let (plus, minus) = share(start + b, c);
+                    let weight = rows.weights[start + b];
+                    (weight * plus, weight * minus)
+                });
+            }
+            gatherer.finish()
+        })
+        .collect()
+}
+
+/// log p of each row.
+pub(crate) fn row_log_densities(rows: &Rows, mixing: &Mixing) -> Vec<f64> {
+    let settings = &rows.settings;
+    let m = settings.m();
+    let mut out = Vec::with_capacity(rows.n());
+    let mut logs = Vec::new();
+    for cell in 0..rows.ends.len() {
+        let parts = acting(settings, &mixing.log_weights[cell], mixing.set(cell));
+        let mut stack = Stack::new(settings.d, m, &parts);
+        let range = rows.cell(cell);
+        for start in range.clone().step_by(BLOCK) {
+            let n = BLOCK.min(range.end - start);
+            stack.log_densities(&rows.z[start * m..(start + n) * m], n, &mut logs);
+            out.extend(logs.chunks_exact_mut(parts.len()).map(normalize));
+        }
+    }
+    out
+}
+
 /// Steps until J gains less than `tolerance` per unit of weight, or `max_steps`.
-pub(crate) fn run(rows: &Rows, start: &Responsibilities, k: usize, max_steps: usize, tolerance: f64) -> Fit {
-    let mixing = maximize(rows, start, k);
-    resume(rows, mixing, max_steps, tolerance)
+pub(crate) fn run(rows: &Rows, moments: &[Vec<Moment>], max_steps: usize, tolerance: f64) -> Fit {
+    resume(rows, maximize(&rows.settings, moments), max_steps, tolerance)
 }
 
 /// [`run`] from parameters.
 pub(crate) fn resume(rows: &Rows, mut mixing: Mixing, max_steps: usize, tolerance: f64) -> Fit {
-    let k = mixing.components.len();
+    let settings = &rows.settings;
     let enough = tolerance * rows.total_weight();
-    let (mut responsibilities, mut log_likelihood) = expect(rows, &mixing);
-    let mut objectives = vec![log_likelihood + log_prior(rows, &mixing)];
-    let mut converged = k == 1 && !rows.latent_sign;
+    let (mut log_likelihood, mut moments) = expect(rows, &mixing);
+    let mut objectives = vec![log_likelihood + log_prior(settings, &mixing)];
+    let mut converged = mixing.k() == 1 && !settings.latent_sign;
     while !converged && objectives.len() <= max_steps {
-        let next = maximize(rows, &responsibilities, k);
-        let (next_responsibilities, next_likelihood) = expect(rows, &next);
-        let objective = next_likelihood + log_prior(rows, &next);
-        let gain = objective - objectives[objectives.len() - 1];
+        let next = maximize(settings, &moments);
+        let (next_likelihood, next_moments) = expect(rows, &next);
+        let objective = next_likelihood + log_prior(settings, &next);
+        let before = objectives[objectives.len() - 1];
+        debug_assert!(
+            objective >= before - ROUNDING * (before.abs() + rows.total_weight()),
+            "EM fell from {before} to {objective}"
+        );
         objectives.push(objective);
-        (mixing, responsibilities, log_likelihood) = (next, next_responsibilities, next_likelihood);
-        converged = gain < enough;
+        (mixing, moments, log_likelihood) = (next, next_moments, next_likelihood);
+        converged = objective - before < enough;
     }
+    let k = mixing.k();
     Fit {
+        masses: (0..k)
+            .map(|c| moments.iter().map(|cell| cell[c].mass).sum())
+            .collect(),
         mixing,
         log_likelihood,
         objectives,
         converged,
     }
-}
-
-/// log p of each row under each component: n × K, and with a latent sign the same for −y.
-fn log_densities(rows: &Rows, mixing: &Mixing) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-    let (d, m, n, k) = (rows.d, rows.z.nrows(), rows.n(), mixing.components.len());
-    // Rows k·d … of `own` hold L⁻¹ y, of `pull` L⁻¹ B [1, p]; both signs need them apart.
-    let mut own = Mat::<f64>::zeros(k * d, m);
-    let mut pull = Mat::<f64>::zeros(k * d, m);
-    let mut constants = Vec::with_capacity(k);
-    for (c, component) in mixing.components.iter().enumerate() {
-        let lower = cholesky(&component.covariance).unwrap_or_else(|| DMatrix::identity(d, d));
-        let white = solve_lower(&lower, &DMatrix::identity(d, d));
-        let slopes = &white * &component.slopes;
-        for i in 0..d {
-            for j in 0..d {
-                own[(c * d + i, j)] = white[(i, j)];
-            }
-            for j in d..m {
-                pull[(c * d + i, j)] = slopes[(i, j - d)];
-            }
-        }
-        let log_root: f64 = (0..d).map(|i| lower[(i, i)].ln()).sum();
-        constants.push(-0.5 * d as f64 * LOG_TAU - log_root);
-    }
-    let white = |left: &Mat<f64>| {
-        let mut out = Mat::<f64>::zeros(k * d, n);
-        matmul(&mut out, Accum::Replace, left, &rows.z, 1.0, Par::Seq);
-        out
-    };
-    let halves = |out: &Mat<f64>, shift: Option<&Mat<f64>>, sign: f64| -> Vec<Vec<f64>> {
-        (0..n)
-            .map(|i| {
-                (0..k)
-                    .map(|c| {
-                        let mut square = 0.0;
-                        for j in c * d..(c + 1) * d {
-                            let residual = out[(j, i)] * sign - shift.map_or(0.0, |shift| shift[(j, i)]);
-                            square += residual * residual;
-                        }
-                        constants[c] - 0.5 * square + mixing.log_weights[rows.cell[i]][c]
-                    })
-                    .collect()
-            })
-            .collect()
-    };
-    if rows.latent_sign {
-        let (own, pull) = (white(&own), white(&pull));
-        (halves(&own, Some(&pull), 1.0), halves(&own, Some(&pull), -1.0))
-    } else {
-        let both = Mat::from_fn(k * d, m, |i, j| own[(i, j)] - pull[(i, j)]);
-        (halves(&white(&both), None, 1.0), Vec::new())
-    }
-}
-
-/// log p of each row, and responsibilities with the weighted log-likelihood.
-pub(crate) fn row_log_densities(rows: &Rows, mixing: &Mixing) -> Vec<f64> {
-    let (plus, minus) = log_densities(rows, mixing);
-    (0..rows.n())
-        .map(|i| match minus.get(i) {
-            None => log_sum_exp(&plus[i]),
-            Some(minus) => log_sum_exp(&[log_sum_exp(&plus[i]), log_sum_exp(minus)]) - std::f64::consts::LN_2,
-        })
-        .collect()
-}
-
-/// The E-step.
-fn expect(rows: &Rows, mixing: &Mixing) -> (Responsibilities, f64) {
-    let (mut plus, mut minus) = log_densities(rows, mixing);
-    let mut log_likelihood = 0.0;
-    for i in 0..rows.n() {
-        if rows.latent_sign {
-            let total = log_sum_exp(&[log_sum_exp(&plus[i]), log_sum_exp(&minus[i])]);
-            log_likelihood += rows.weights[i] * (total - std::f64::consts::LN_2);
-            for (a, b) in plus[i].iter_mut().zip(&mut minus[i]) {
-                let (p, m) = ((*a - total).exp(), (*b - total).exp());
-                (*a, *b) = (p + m, p - m);
-            }
-        } else {
-            let total = log_sum_exp(&plus[i]);
-            log_likelihood += rows.weights[i] * total;
-            for a in &mut plus[i] {
-                *a = (*a - total).exp();
-            }
-        }
-    }
-    (
-        Responsibilities {
-            total: plus,
-            signed: minus,
-        },
-        log_likelihood,
-    )
-}
-
-/// The M-step: mixing weights, regressions and covariances, each the exact maximizer of J.
-fn maximize(rows: &Rows, responsibilities: &Responsibilities, k: usize) -> Mixing {
-    let (d, m, n) = (rows.d, rows.z.nrows(), rows.n());
-    let mut mass = vec![vec![0.0; k]; rows.n_cells];
-    for i in 0..n {
-        for c in 0..k {
-            mass[rows.cell[i]][c] += rows.weights[i] * responsibilities.total[i][c];
-        }
-    }
-    let log_weights = mass
-        .iter()
-        .map(|row| {
-            let total: f64 = row.iter().sum();
-            row.iter()
-                .map(|mass| ((mass + 1.0 / k as f64) / (total + 1.0)).ln())
-                .collect()
-        })
-        .collect();
-    let mut scaled = Mat::<f64>::zeros(m, n);
-    let mut moments = Mat::<f64>::zeros(m, m);
-    let mut cross = Mat::<f64>::zeros(m, m);
-    let components = (0..k)
-        .map(|c| {
-            let share: f64 = mass.iter().map(|row| row[c]).sum();
-            for i in 0..n {
-                let r = rows.weights[i] * responsibilities.total[i][c];
-                for j in 0..m {
-                    scaled[(j, i)] = r * rows.z[(j, i)];
-                }
-            }
-            matmul(
-                &mut moments,
-                Accum::Replace,
-                &scaled,
-                rows.z.transpose(),
-                1.0,
-                Par::Seq,
-            );
-            if rows.latent_sign {
-                for i in 0..n {
-                    let r = rows.weights[i] * responsibilities.signed[i][c];
-                    for j in 0..m {
-                        scaled[(j, i)] = r * rows.z[(j, i)];
-                    }
-                }
-                matmul(
-                    &mut cross,
-                    Accum::Replace,
-                    &scaled,
-                    rows.z.transpose(),
-                    1.0,
-                    Par::Seq,
-                );
-            }
-            let product = if rows.latent_sign { &cross } else { &moments };
-            let yy = DMatrix::from_fn(d, d, |i, j| moments[(i, j)]);
-            let yx = DMatrix::from_fn(d, m - d, |i, j| product[(i, d + j)]);
-            let xx = DMatrix::from_fn(m - d, m - d, |i, j| moments[(d + i, d + j)]);
-            regress(&yy, &yx, xx, share, rows)
-        })
-        .collect();
-    Mixing {
-        log_weights,
-        components,
-    }
-}
-
-/// One regression from its weighted moments.
-fn regress(yy: &DMatrix<f64>, yx: &DMatrix<f64>, mut xx: DMatrix<f64>, mass: f64, rows: &Rows) -> Regression {
-    let d = yy.nrows();
-    for (i, ridge) in rows.ridge.iter().enumerate() {
-        xx[(i, i)] += ridge;
-    }
-    symmetrize(&mut xx);
-    // Collinear parents leave the Gram matrix singular to rounding; more ridge decides between equal fits.
-    let mut extra = RIDGE * xx.diagonal().max().max(1.0);
-    let lower = loop {
-        if let Some(lower) = cholesky(&xx) {
-            break lower;
-        }
-        for i in 0..xx.nrows() {
-            xx[(i, i)] += extra;
-        }
-        extra *= 10.0;
-    };
-    let half = solve_lower(&lower, &yx.transpose());
-    let slopes = solve_lower_transpose(&lower, &half).transpose();
-    let mut scatter = yy - half.transpose() * &half;
-    for i in 0..d {
-        scatter[(i, i)] += rows.prior.scatter();
-    }
-    symmetrize(&mut scatter);
-    let covariance = clip(&(scatter / (mass + rows.prior.rows)), &rows.floor);
-    Regression { slopes, covariance }
-}
-
-/// The covariance nearest in likelihood that is nowhere below the floor: eigenvalues in units of the floor, at least 1.
-fn clip(covariance: &DMatrix<f64>, floor: &[f64]) -> DMatrix<f64> {
-    let d = covariance.nrows();
-    // A floor of zero becomes a relative one, for rounding's sake only.
-    let unit: Vec<f64> = floor.iter().map(|f| f.max(1e-7)).collect();
-    let mut white = DMatrix::from_fn(d, d, |i, j| covariance[(i, j)] / (unit[i] * unit[j]));
-    symmetrize(&mut white);
-    if cholesky(&(&white - DMatrix::identity(d, d))).is_some() {
-        return covariance.clone();
-    }
-    let eigen = white.symmetric_eigen();
-    let clipped = eigen.eigenvalues.map(|value| value.max(1.0));
-    let mut out = &eigen.eigenvectors * DMatrix::from_diagonal(&clipped) * eigen.eigenvectors.transpose();
-    for i in 0..d {
-        for j in 0..d {
-            out[(i, j)] *= unit[i] * unit[j];
-        }
-    }
-    symmetrize(&mut out);
-    out
-}
-
-/// The priors' part of J.
-fn log_prior(rows: &Rows, mixing: &Mixing) -> f64 {
-    let ridge = DMatrix::from_diagonal(&DVector::from_column_slice(&rows.ridge));
-    let k = mixing.components.len() as f64;
-    let mut sum: f64 = mixing
-        .log_weights
-        .iter()
-        .flatten()
-        .map(|log_weight| log_weight / k)
-        .sum();
-    for component in &mixing.components {
-        let d = component.covariance.nrows();
-        let Some(lower) = cholesky(&component.covariance) else {
-            continue;
-        };
-        let log_determinant: f64 = 2.0 * (0..d).map(|i| lower[(i, i)].ln()).sum::<f64>();
-        let scatter = DMatrix::from_diagonal(&DVector::from_element(d, rows.prior.scatter()))
-            + &component.slopes * &ridge * component.slopes.transpose();
-        let trace = solve_lower_transpose(&lower, &solve_lower(&lower, &scatter)).trace();
-        sum -= 0.5 * (rows.prior.rows * log_determinant + trace);
-    }
-    sum
-}
-
-/// Mass of each component over all cells.
-pub(crate) fn masses(rows: &Rows, mixing: &Mixing) -> Vec<f64> {
-    let (responsibilities, _) = expect(rows, mixing);
-    let mut out = vec![0.0; mixing.components.len()];
-    for (row, weight) in responsibilities.total.iter().zip(&rows.weights) {
-        for (mass, r) in out.iter_mut().zip(row) {
-            *mass += weight * r;
-        }
-    }
-    out
 }

@@ -1,186 +1,235 @@
-//! One node's columns and its parents', complete rows only, with their units.
+//! The table in standardised units, and which of its rows have all that a node's fit needs.
 
 use crate::cpd::Scaling;
 use crate::error::ModelError;
-use crate::network::{MixtureSpec, Network, NodeKind, NodeSpec};
+use crate::network::{MixtureSpec, Network, NodeKind};
 use crate::table::Table;
 use crate::train::is_centered;
 
+/// All nodes' cells, standardised, with gaps.
+pub(crate) struct Cells {
+    /// Weight of each row.
+    pub weights: Vec<f64>,
+    /// Per continuous node and dimension the value of each row, NaN where missing.
+    pub values: Vec<Vec<Vec<f64>>>,
+    /// Per discrete node the state of each row.
+    pub states: Vec<Vec<Option<usize>>>,
+    /// Per continuous node the units.
+    pub scaling: Vec<Scaling>,
+}
+
+impl Cells {
+    pub fn read(network: &Network, table: &Table, weights: Vec<f64>) -> Result<Self, ModelError> {
+        let mut cells = Self {
+            weights,
+            values: Vec::new(),
+            states: Vec::new(),
+            scaling: Vec::new(),
+        };
+        for node in network.nodes() {
+            let mut values = Vec::new();
+            let mut states = Vec::new();
+            let mut scaling = Scaling {
+                mean: Vec::new(),
+                standard_deviation: Vec::new(),
+            };
+            match &node.kind {
+                NodeKind::Discrete { states: names, .. } => {
+                    states = table.states(&node.name, &node.name, names)?;
+                }
+                // Such a node reads its own rows.
+                NodeKind::VonMisesFisher(_) => {}
+                NodeKind::Mixture(spec) => {
+                    for column in &spec.columns {
+                        let column = table.numbers(column, &node.name)?;
+                        let seen = |(value, weight): (&f64, &f64)| !value.is_nan() && *weight > 0.0;
+                        if !column.iter().zip(&cells.weights).any(seen) {
+                            return Err(ModelError::NoRows {
+                                node: node.name.clone(),
+                                n_rows: table.n_rows(),
+                            });
+                        }
+                        values.push(column);
+                    }
+                    scaling = standardise(&mut values, &cells.weights, spec);
+                }
+            }
+            cells.values.push(values);
+            cells.states.push(states);
+            cells.scaling.push(scaling);
+        }
+        Ok(cells)
+    }
+
+    pub fn n_rows(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// Whether a node has no gap in a row.
+    pub fn is_known(&self, node: usize, row: usize) -> bool {
+        if self.states[node].is_empty() {
+            self.values[node].iter().all(|column| !column[row].is_nan())
+        } else {
+            self.states[node][row].is_some()
+        }
+    }
+
+    /// Row of the table or of the components; `None` where a discrete parent is missing.
+    pub fn configuration(&self, network: &Network, node: usize, row: usize) -> Option<usize> {
+        let mut configuration = 0;
+        for &parent in &network.nodes()[node].parents {
+            if let NodeKind::Discrete { states, .. } = &network.nodes()[parent].kind {
+                configuration = configuration * states.len() + self.states[parent][row]?;
+            }
+        }
+        Some(configuration)
+    }
+
+    /// Units of a node's continuous parents, one after the other.
+    pub fn parent_scaling(&self, network: &Network, node: usize) -> Scaling {
+        let mut scaling = Scaling {
+            mean: Vec::new(),
+            standard_deviation: Vec::new(),
+        };
+        for &parent in &network.nodes()[node].parents {
+            scaling.mean.extend(&self.scaling[parent].mean);
+            scaling
+                .standard_deviation
+                .extend(&self.scaling[parent].standard_deviation);
+        }
+        scaling
+    }
+}
+
 /// Rows that have every column of a node and of its parents.
 pub(crate) struct Family {
-    /// Rows of the table that are complete and have a positive weight.
+    /// Rows of the table with a positive weight, sorted by configuration.
     pub rows: Vec<usize>,
-    pub weights: Vec<f64>,
+    /// End of each configuration's rows.
+    pub ends: Vec<usize>,
     /// Group of each row, where known.
     pub groups: Option<Vec<usize>>,
-    /// Configuration of the discrete parents, per row.
-    pub configurations: Vec<usize>,
-    pub n_configurations: usize,
-    /// State of a discrete node, per row.
-    pub states: Vec<usize>,
-    /// Standardised own values of a continuous node, per row.
-    pub y: Vec<Vec<f64>>,
-    /// Standardised values of the continuous parents, per row.
-    pub p: Vec<Vec<f64>>,
-    pub scaling: Scaling,
-    pub parent_scaling: Scaling,
+    /// How many rows are complete.
+    pub n_complete: usize,
+    /// Whether too few rows were complete, so that rows with gaps are among them.
+    pub with_gaps: bool,
+    /// Continuous parents.
+    pub parents: Vec<usize>,
 }
 
 impl Family {
-    pub fn read(
-        network: &Network,
-        node: &NodeSpec,
-        table: &Table,
-        weights: &[f64],
-        groups: Option<&[usize]>,
-    ) -> Result<Self, ModelError> {
-        let n = table.n_rows();
-        let mut complete: Vec<bool> = weights.iter().map(|w| *w > 0.0).collect();
-        let mut configurations = vec![0; n];
-        let mut n_configurations = 1;
-        let mut p: Vec<Vec<f64>> = vec![Vec::new(); n];
-        let mut parent_specs = Vec::new();
-        for &parent in &node.parents {
-            let parent = &network.nodes()[parent];
-            match &parent.kind {
-                NodeKind::Discrete { states, .. } => {
-                    n_configurations *= states.len();
-                    for (row, state) in table
-                        .states(&parent.name, &parent.name, states)?
-                        .into_iter()
-                        .enumerate()
-                    {
-                        complete[row] &= state.is_some();
-                        configurations[row] = configurations[row] * states.len() + state.unwrap_or(0);
-                    }
-                }
-                // A network has no arcs from such a node.
-                NodeKind::VonMisesFisher(_) => {}
-                NodeKind::Mixture(spec) => {
-                    parent_specs.push(spec);
-                    append(&mut p, &mut complete, table, &parent.name, spec)?;
+    pub fn read(network: &Network, node: usize, cells: &Cells, groups: Option<&[usize]>) -> Self {
+        let spec = &network.nodes()[node];
+        let is_discrete = |i: usize| matches!(network.nodes()[i].kind, NodeKind::Discrete { .. });
+        let n_configurations: usize = spec
+            .parents
+            .iter()
+            .map(|&parent| match &network.nodes()[parent].kind {
+                NodeKind::Discrete { states, .. } => states.len(),
+                NodeKind::Mixture(_) | NodeKind::VonMisesFisher(_) => 1,
+            })
+            .product();
+        let parents: Vec<usize> = spec
+            .parents
+            .iter()
+            .copied()
+            .filter(|&i| !is_discrete(i))
+            .collect();
+        let usable = |row: &usize, complete: bool| {
+            let mut family = parents.iter().chain([&node]);
+            cells.weights[*row] > 0.0
+                && (if complete || is_discrete(node) {
+                    family.all(|&i| cells.is_known(i, *row))
+                } else {
+                    cells.values[node].iter().any(|column| !column[*row].is_nan())
+                })
+        };
+        let sort = |complete: bool| {
+            let mut of: Vec<Vec<usize>> = vec![Vec::new(); n_configurations];
+            for row in (0..cells.n_rows()).filter(|row| usable(row, complete)) {
+                if let Some(configuration) = cells.configuration(network, node, row) {
+                    of[configuration].push(row);
                 }
             }
-        }
-        let mut states = vec![0; n];
-        let mut y: Vec<Vec<f64>> = vec![Vec::new(); n];
-        match &node.kind {
-            NodeKind::Discrete { states: names, .. } => {
-                for (row, state) in table
-                    .states(&node.name, &node.name, names)?
-                    .into_iter()
-                    .enumerate()
-                {
-                    complete[row] &= state.is_some();
-                    states[row] = state.unwrap_or(0);
-                }
-            }
-            // Such a node reads its own rows.
-            NodeKind::VonMisesFisher(_) => {}
-            NodeKind::Mixture(spec) => append(&mut y, &mut complete, table, &node.name, spec)?,
-        }
-        let rows: Vec<usize> = (0..n).filter(|&row| complete[row]).collect();
-        let is_discrete = matches!(node.kind, NodeKind::Discrete { .. });
-        if rows.is_empty() && !is_discrete {
-            return Err(ModelError::NoRows {
-                node: node.name.clone(),
-                n_rows: n,
-            });
-        }
-        let pick = |values: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-            let mut values: Vec<Option<Vec<f64>>> = values.into_iter().map(Some).collect();
-            rows.iter().filter_map(|&row| values[row].take()).collect()
+            of
         };
-        let (mut y, mut p) = (pick(y), pick(p));
-        let weights: Vec<f64> = rows.iter().map(|&row| weights[row]).collect();
-        let scaling = match &node.kind {
-            NodeKind::Mixture(spec) => standardise(&mut y, &weights, &[spec]),
-            NodeKind::Discrete { .. } | NodeKind::VonMisesFisher(_) => Scaling {
-                mean: vec![],
-                standard_deviation: vec![],
-            },
-        };
-        let parent_scaling = standardise(&mut p, &weights, &parent_specs);
-        Ok(Self {
-            weights,
+        let mut of = sort(true);
+        let q: usize = parents.iter().map(|&i| cells.values[i].len()).sum();
+        let least = cells.values[node].len() + q + 2;
+        let n_complete: usize = of.iter().map(Vec::len).sum();
+        let mut with_gaps = false;
+        if !is_discrete(node) && n_complete < least {
+            of = sort(false);
+            with_gaps = of.iter().map(Vec::len).sum::<usize>() > n_complete;
+        }
+        let rows: Vec<usize> = of.concat();
+        let mut end = 0;
+        let ends = of
+            .iter()
+            .map(|rows| {
+                end += rows.len();
+                end
+            })
+            .collect();
+        Self {
             groups: groups.map(|groups| rows.iter().map(|&row| groups[row]).collect()),
-            configurations: rows.iter().map(|&row| configurations[row]).collect(),
-            n_configurations,
-            states: rows.iter().map(|&row| states[row]).collect(),
-            y,
-            p,
-            scaling,
-            parent_scaling,
             rows,
-        })
-    }
-}
-
-/// Appends a node's columns to each row.
-fn append(
-    values: &mut [Vec<f64>],
-    complete: &mut [bool],
-    table: &Table,
-    node: &str,
-    spec: &MixtureSpec,
-) -> Result<(), ModelError> {
-    for column in &spec.columns {
-        for (row, value) in table.numbers(column, node)?.into_iter().enumerate() {
-            complete[row] &= !value.is_nan();
-            values[row].push(value);
+            ends,
+            n_complete,
+            with_gaps,
+            parents,
         }
     }
-    Ok(())
+
+    /// Positions in `rows` of a configuration; `None` stands for all.
+    pub fn members(&self, configuration: Option<usize>) -> std::ops::Range<usize> {
+        match configuration {
+            None => 0..self.rows.len(),
+            Some(0) => 0..self.ends[0],
+            Some(i) => self.ends[i - 1]..self.ends[i],
+        }
+    }
 }
 
 /// Subtracts each column's mean and divides by its standard deviation. Nodes with a latent sign keep their origin and
 /// share one unit; a constant column takes its noise floor, or a thousandth of its value, as unit.
-fn standardise(values: &mut [Vec<f64>], weights: &[f64], specs: &[&MixtureSpec]) -> Scaling {
-    let total: f64 = weights.iter().sum();
+fn standardise(columns: &mut [Vec<f64>], weights: &[f64], spec: &MixtureSpec) -> Scaling {
     let mut scaling = Scaling {
         mean: Vec::new(),
         standard_deviation: Vec::new(),
     };
-    for spec in specs {
-        let start = scaling.mean.len();
-        for (d, floor) in spec.noise_floor.iter().enumerate() {
-            let column = start + d;
-            let weighted = |f: &dyn Fn(f64) -> f64| -> f64 {
-                values
-                    .iter()
-                    .zip(weights)
-                    .map(|(row, w)| w * f(row[column]))
-                    .sum::<f64>()
-                    / total
-            };
-            let mean = if is_centered(spec.sign) {
-                weighted(&|x| x)
-            } else {
-                0.0
-            };
-            let deviation = weighted(&|x| (x - mean) * (x - mean)).sqrt();
-            let least = floor.max(1e-9 * mean.abs());
-            let unit = if deviation > least {
-                deviation
-            } else if *floor > 0.0 {
-                *floor
-            } else {
-                (1e-3 * mean.abs()).max(1e-9)
-            };
-            scaling.mean.push(mean);
-            scaling.standard_deviation.push(unit);
-        }
-        if !is_centered(spec.sign) {
-            let own = &mut scaling.standard_deviation[start..];
-            let common = (own.iter().map(|s| s * s).sum::<f64>() / own.len() as f64).sqrt();
-            own.fill(common);
-        }
+    for (column, floor) in columns.iter().zip(&spec.noise_floor) {
+        let seen = || column.iter().zip(weights).filter(|(value, _)| !value.is_nan());
+        let total: f64 = seen().map(|(_, w)| w).sum();
+        let weighted =
+            |f: &dyn Fn(f64) -> f64| -> f64 { seen().map(|(x, w)| w * f(*x)).sum::<f64>() / total };
+        let mean = if is_centered(spec.sign) {
+            weighted(&|x| x)
+        } else {
+            0.0
+        };
+        let deviation = weighted(&|x| (x - mean) * (x - mean)).sqrt();
+        let least = floor.max(1e-9 * mean.abs());
+        let unit = if deviation > least {
+            deviation
+        } else if *floor > 0.0 {
+            *floor
+        } else {
+            (1e-3 * mean.abs()).max(1e-9)
+        };
+        scaling.mean.push(mean);
+        scaling.standard_deviation.push(unit);
     }
-    for row in values {
-        for (value, (mean, unit)) in row
-            .iter_mut()
-            .zip(scaling.mean.iter().zip(&scaling.standard_deviation))
-        {
+    if !is_centered(spec.sign) {
+        let own = &mut scaling.standard_deviation;
+        let common = (own.iter().map(|s| s * s).sum::<f64>() / own.len() as f64).sqrt();
+        own.fill(common);
+    }
+    for (column, (mean, unit)) in columns
+        .iter_mut()
+        .zip(scaling.mean.iter().zip(&scaling.standard_deviation))
+    {
+        for value in column {
             *value = (*value - mean) / unit;
         }
     }

@@ -54,6 +54,8 @@ pub struct MixtureSpec {
     pub order: MixtureOrder,
     /// Which configurations share components or weights.
     pub weights: Weights,
+    /// Whether all components of all configurations have one covariance.
+    pub shared_covariance: bool,
     /// Smallest standard deviation of each column, in its unit; 0 for none.
     pub noise_floor: Vec<f64>,
     /// Whether q and −q are the same value.
@@ -109,6 +111,7 @@ struct RawNode {
     parents: Vec<String>,
     mixture: Option<RawMixture>,
     weights: Option<Weights>,
+    covariance: Option<Covariance>,
     noise_floor: Option<Floor>,
     sign: Option<Sign>,
     sphere: Option<bool>,
@@ -137,6 +140,13 @@ enum Choose {
     Bic,
     #[serde(rename = "bic+cv")]
     BicCv,
+}
+
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Covariance {
+    Own,
+    Shared,
 }
 
 #[derive(Deserialize)]
@@ -327,6 +337,7 @@ impl RawNode {
             ("columns", self.columns.is_some()),
             ("mixture", self.mixture.is_some()),
             ("weights", self.weights.is_some()),
+            ("covariance", self.covariance.is_some()),
             ("noise_floor", self.noise_floor.is_some()),
             ("sign", self.sign.is_some()),
             ("sphere", self.sphere.is_some()),
@@ -376,6 +387,7 @@ impl RawNode {
             columns,
             order: self.mixture_order()?,
             weights,
+            shared_covariance: self.covariance == Some(Covariance::Shared),
             noise_floor,
             sign,
             sphere,

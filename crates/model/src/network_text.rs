@@ -90,6 +90,9 @@ fn mixture(out: &mut String, spec: &MixtureSpec) {
         Weights::Shared => put(out, "weights", "\"shared\""),
         Weights::Root => put(out, "weights", "\"root\""),
     }
+    if spec.shared_covariance {
+        put(out, "covariance", "\"shared\"");
+    }
     if spec.noise_floor.iter().any(|floor| *floor > 0.0) {
         let floors = spec
             .noise_floor
@@ -152,6 +155,7 @@ mod tests {
             parents = ["ta\"sk"]
             mixture = { components = 3 }
             weights = "shared"
+            covariance = "shared"
             noise_floor = [0.0, 1e-5]
             [[node]]
             name = "dir"

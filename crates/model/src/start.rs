@@ -1,17 +1,26 @@
-//! Where EM starts: k-means++ on the values, or on what a single regression leaves over.
+//! Where EM starts: k-means++ on the values, or on what a single regression leaves over, or the fit with one component
+//! fewer, split.
+//!
+//! All starts run a few steps, the better half goes on, and the best one is carried to its end: most starts are hopeless
+//! long before they settle.
 
-use faer::Mat;
-use nalgebra::DMatrix;
+use nalgebra::DVector;
 use rand::{Rng, RngExt};
 
-use crate::em::{Fit, Mixing, Responsibilities, Rows, masses, resume, row_log_densities, run};
+use crate::cpd::Weights;
+use crate::em::{Fit, Rows, expect, gather, resume, row_log_densities, run};
+use crate::moments::{Mixing, Moment, maximize};
 
 /// Share of a row's responsibility that its own cluster starts with.
 const SOFT: f64 = 0.9;
 /// Lloyd steps after k-means++: the start only has to be near.
 const LLOYD_STEPS: usize = 8;
-/// EM steps of each start before the best one is carried on.
-const SHORT_STEPS: usize = 12;
+/// EM steps of each start before the worse half is given up.
+const FIRST_STEPS: usize = 4;
+/// EM steps of the better half before the best one is carried on.
+const SHORT_STEPS: usize = 10;
+/// Starts look at no more rows than this, evenly spread.
+const MOST_START_ROWS: usize = 20_000;
 
 /// How a mixture is fitted.
 #[derive(Debug, Clone, Copy)]
@@ -28,63 +37,171 @@ pub(crate) struct Robust {
     pub dropped: usize,
 }
 
-/// Fits k components (fewer where rows do not carry them).
-pub(crate) fn fit_mixture(rows: &Rows, k: usize, options: FitOptions, rng: &mut impl Rng) -> Robust {
-    let mut best: Option<Fit> = None;
-    let restarts = if k == 1 && !rows.latent_sign {
-        1
+/// Fits each number of components in turn; each but the first also starts from the one before, split.
+pub(crate) fn fit_orders(
+    rows: &Rows,
+    orders: &[usize],
+    options: FitOptions,
+    mut rng: impl FnMut(usize) -> rand_chacha::ChaCha8Rng,
+) -> Vec<(usize, Robust)> {
+    let mut out: Vec<(usize, Robust)> = Vec::with_capacity(orders.len());
+    for &k in orders {
+        let smaller = out
+            .last()
+            .map(|(_, robust)| &robust.fit.mixing)
+            .filter(|mixing| mixing.k() + 1 == k);
+        let robust = fit_mixture(rows, k, smaller, options, &mut rng(k));
+        out.push((k, robust));
+    }
+    out
+}
+
+/// Fits k components (fewer where rows do not carry them). `smaller` is a fit with one component fewer.
+pub(crate) fn fit_mixture(
+    rows: &Rows,
+    k: usize,
+    smaller: Option<&Mixing>,
+    options: FitOptions,
+    rng: &mut impl Rng,
+) -> Robust {
+    let sample = (rows.n() > MOST_START_ROWS).then(|| {
+        let step = |i: usize| i * rows.n() / MOST_START_ROWS;
+        rows.select(&(0..MOST_START_ROWS).map(step).collect::<Vec<_>>())
+    });
+    let best = best_start(sample.as_ref().unwrap_or(rows), k, smaller, options, rng);
+    let fit = if sample.is_some() {
+        resume(rows, best.mixing, options.max_steps, options.tolerance)
     } else {
-        options.restarts.max(1)
+        finish(rows, best, options)
     };
-    let residuals = (rows.q() > 0 && k > 1 && restarts > 1).then(|| residuals(rows));
-    for restart in 0..restarts {
-        let features = match &residuals {
-            Some(residuals) if restart % 2 == 1 => residuals,
-            _ => &rows.z,
-        };
-        let start = cluster(rows, features, k, rng);
-        let fit = run(
-            rows,
-            &start,
-            k,
-            SHORT_STEPS.min(options.max_steps),
-            options.tolerance,
-        );
-        let better = best.as_ref().is_none_or(|best| last(&fit) > last(best));
-        if better {
-            best = Some(fit);
+    let fit = if k > 2 && options.restarts > 1 {
+        merge_and_split(rows, fit, options)
+    } else {
+        fit
+    };
+    keep_carried(rows, fit, options)
+}
+
+/// Two components that are nearly one become one, and the widest other component becomes two, if J gains by it: what
+/// starts from clusters most often get wrong.
+fn merge_and_split(rows: &Rows, fit: Fit, options: FitOptions) -> Fit {
+    let settings = &rows.settings;
+    let (_, moments) = expect(rows, &fit.mixing);
+    let k = fit.mixing.k();
+    let log_volume = |mixing: &Mixing, c: usize| -> f64 {
+        let sets = mixing.components.iter();
+        sets.map(|set| set[c].covariance.determinant().max(f64::MIN_POSITIVE).ln())
+            .sum()
+    };
+    let volumes: Vec<f64> = (0..k).map(|c| log_volume(&fit.mixing, c)).collect();
+    let mut least = (f64::INFINITY, 0, 1, fit.mixing.clone());
+    for a in 0..k {
+        for b in a + 1..k {
+            let mut merged = moments.clone();
+            for cell in &mut merged {
+                let other = cell.remove(b);
+                cell[a].add(&other);
+            }
+            let mass = fit.masses[a] + fit.masses[b];
+            let merged = maximize(settings, &merged);
+            let loss =
+                mass * log_volume(&merged, a) - fit.masses[a] * volumes[a] - fit.masses[b] * volumes[b];
+            if loss < least.0 {
+                least = (loss, a, b, merged);
+            }
         }
     }
-    let Some(best) = best else {
-        unreachable!("there is at least one start")
+    let (_, a, b, merged) = least;
+    let widest = (0..k)
+        .filter(|c| *c != a && *c != b)
+        .fold(None, |best: Option<usize>, c| match best {
+            Some(best) if volumes[best] >= volumes[c] => Some(best),
+            _ => Some(c),
+        });
+    let Some(widest) = widest else { return fit };
+    // Components after b have moved down by one.
+    let start = split(&merged, Some(if widest > b { widest - 1 } else { widest }));
+    let short = resume(rows, start, SHORT_STEPS.min(options.max_steps), options.tolerance);
+    // What is still far behind after some steps is no better optimum.
+    let behind = last(&fit) - last(&short);
+    let gain = match short.objectives.as_slice() {
+        [.., before, after] => after - before,
+        _ => 0.0,
     };
+    if behind > 10.0 * gain {
+        return fit;
+    }
+    let other = finish(rows, short, options);
+    if last(&other) > last(&fit) { other } else { fit }
+}
+
+fn best_start(
+    rows: &Rows,
+    k: usize,
+    smaller: Option<&Mixing>,
+    options: FitOptions,
+    rng: &mut impl Rng,
+) -> Fit {
+    let alone = k == 1 && !rows.settings.latent_sign;
+    let restarts = if alone { 1 } else { options.restarts.max(1) };
+    let residuals =
+        (rows.settings.q > 0 && k > 1 && restarts > 1).then(|| residuals(rows, options.tolerance));
+    let first = FIRST_STEPS.min(options.max_steps);
+    let mut fits: Vec<Fit> = Vec::with_capacity(restarts);
+    for restart in 0..restarts {
+        let fit = match smaller {
+            Some(smaller) if restart > 0 && restart + 1 == restarts => {
+                resume(rows, split(smaller, None), first, options.tolerance)
+            }
+            _ => {
+                let features = residuals.as_deref().filter(|_| restart % 2 == 1);
+                let start = cluster(rows, features, k, rng);
+                run(rows, &start, first, options.tolerance)
+            }
+        };
+        fits.push(fit);
+    }
+    fits.sort_by(|a, b| last(b).total_cmp(&last(a)));
+    fits.truncate(restarts.div_ceil(2));
+    if fits.len() > 1 {
+        let short = FitOptions {
+            max_steps: SHORT_STEPS.min(options.max_steps),
+            ..options
+        };
+        fits = fits.into_iter().map(|fit| finish(rows, fit, short)).collect();
+        fits.sort_by(|a, b| last(b).total_cmp(&last(a)));
+    }
+    fits.swap_remove(0)
+}
+
+/// Starts components that lost their rows anew once, then drops them.
+fn keep_carried(rows: &Rows, fit: Fit, options: FitOptions) -> Robust {
     let mut robust = Robust {
-        fit: finish(rows, best, options),
+        fit,
         reinitialized: 0,
         dropped: 0,
     };
-    while robust.fit.mixing.components.len() > 1 {
-        let mass = masses(rows, &robust.fit.mixing);
+    let least = rows.settings.least_mass() * robust.fit.mixing.components.len() as f64;
+    while robust.fit.mixing.k() > 1 {
+        let mass = &robust.fit.masses;
         let Some(lost) = (0..mass.len())
-            .filter(|&c| mass[c] < rows.least_mass())
+            .filter(|&c| mass[c] < least)
             .min_by(|&a, &b| mass[a].total_cmp(&mass[b]))
         else {
             break;
         };
         if robust.reinitialized == 0 {
             robust.reinitialized = 1;
-            let again = finish(
-                rows,
-                reinitialize(rows, &robust.fit.mixing, lost, options),
-                options,
-            );
+            let again = reinitialize(rows, &robust.fit.mixing, lost, options);
             if last(&again) > last(&robust.fit) {
                 robust.fit = again;
             }
             continue;
         }
         let mut mixing = robust.fit.mixing.clone();
-        mixing.components.remove(lost);
+        for set in &mut mixing.components {
+            set.remove(lost);
+        }
         for row in &mut mixing.log_weights {
             row.remove(lost);
             let total = crate::gaussian::log_sum_exp(row);
@@ -102,7 +219,7 @@ fn last(fit: &Fit) -> f64 {
     fit.objectives.last().copied().unwrap_or(f64::NEG_INFINITY)
 }
 
-/// Carries a short run to its end; the history joins up.
+/// Carries a short run on; the history joins up.
 fn finish(rows: &Rows, short: Fit, options: FitOptions) -> Fit {
     if short.converged {
         return short;
@@ -114,16 +231,46 @@ fn finish(rows: &Rows, short: Fit, options: FitOptions) -> Fit {
     fit
 }
 
+/// One component, by default the heaviest, becomes two, half a standard deviation to either side along its longest axis.
+fn split(smaller: &Mixing, which: Option<usize>) -> Mixing {
+    let k = smaller.k();
+    let mut mixing = smaller.clone();
+    // Where one set serves all configurations, the same component is split in all.
+    let shared = smaller.components.len() != smaller.log_weights.len();
+    let chosen = |cell: usize| {
+        let row = &smaller.log_weights[if shared { 0 } else { cell }];
+        which.unwrap_or_else(|| (0..k).fold(0, |best, c| if row[c] > row[best] { c } else { best }))
+    };
+    for (cell, row) in mixing.log_weights.iter_mut().enumerate() {
+        let c = chosen(cell);
+        row[c] -= std::f64::consts::LN_2;
+        row.push(row[c]);
+    }
+    for (i, set) in mixing.components.iter_mut().enumerate() {
+        let c = chosen(i);
+        let eigen = set[c].covariance.clone().symmetric_eigen();
+        let axis = eigen.eigenvalues.imax();
+        let step: DVector<f64> =
+            0.5 * eigen.eigenvalues[axis].max(0.0).sqrt() * eigen.eigenvectors.column(axis);
+        let mut other = set[c].clone();
+        for i in 0..step.len() {
+            set[c].slopes[(i, 0)] += step[i];
+            other.slopes[(i, 0)] -= step[i];
+        }
+        set.push(other);
+    }
+    mixing
+}
+
 /// Gives a component that lost its rows to those that are explained worst.
 fn reinitialize(rows: &Rows, mixing: &Mixing, lost: usize, options: FitOptions) -> Fit {
     let density = row_log_densities(rows, mixing);
     let mut order: Vec<usize> = (0..rows.n()).collect();
     order.sort_by(|&a, &b| density[a].total_cmp(&density[b]));
-    let k = mixing.components.len();
     let mut label = nearest(rows, mixing, lost);
     let mut mass = 0.0;
     for &i in &order {
-        if mass >= 2.0 * rows.least_mass() {
+        if mass >= 2.0 * rows.settings.least_mass() {
             break;
         }
         label[i].0 = lost;
@@ -131,8 +278,7 @@ fn reinitialize(rows: &Rows, mixing: &Mixing, lost: usize, options: FitOptions) 
     }
     run(
         rows,
-        &soften(rows, &label, k),
-        k,
+        &soften(rows, &label, mixing.k()),
         options.max_steps,
         options.tolerance,
     )
@@ -141,125 +287,160 @@ fn reinitialize(rows: &Rows, mixing: &Mixing, lost: usize, options: FitOptions) 
 /// The likeliest other component of each row, and the sign.
 fn nearest(rows: &Rows, mixing: &Mixing, lost: usize) -> Vec<(usize, f64)> {
     let mut best = vec![(f64::NEG_INFINITY, 0, 1.0); rows.n()];
-    for c in (0..mixing.components.len()).filter(|&c| c != lost) {
+    for c in (0..mixing.k()).filter(|&c| c != lost) {
         let alone = Mixing {
-            log_weights: vec![vec![0.0]; rows.n_cells],
-            components: vec![mixing.components[c].clone()],
+            log_weights: vec![vec![0.0]; rows.ends.len()],
+            components: mixing.components.iter().map(|set| vec![set[c].clone()]).collect(),
         };
-        for (i, density) in row_log_densities(rows, &alone).into_iter().enumerate() {
-            if density > best[i].0 {
-                let mean = predict(rows, &alone.components[0].slopes, i);
-                let side: f64 = (0..rows.d).map(|j| mean[j] * rows.z[(j, i)]).sum();
-                best[i] = (density, c, if side < 0.0 { -1.0 } else { 1.0 });
+        let densities = row_log_densities(rows, &alone);
+        for cell in 0..rows.ends.len() {
+            let slopes = &alone.set(cell)[0].slopes;
+            for i in rows.cell(cell) {
+                if densities[i] > best[i].0 {
+                    let row = rows.row(i);
+                    let side: f64 = predict(rows.settings.d, slopes, row)
+                        .iter()
+                        .zip(row)
+                        .map(|(a, b)| a * b)
+                        .sum();
+                    best[i] = (densities[i], c, if side < 0.0 { -1.0 } else { 1.0 });
+                }
             }
         }
     }
     best.into_iter().map(|(_, c, sign)| (c, sign)).collect()
 }
 
-fn predict(rows: &Rows, slopes: &DMatrix<f64>, i: usize) -> Vec<f64> {
-    (0..rows.d)
-        .map(|j| {
-            (0..slopes.ncols())
-                .map(|c| slopes[(j, c)] * rows.z[(rows.d + c, i)])
-                .sum()
-        })
+fn predict(d: usize, slopes: &nalgebra::DMatrix<f64>, row: &[f64]) -> Vec<f64> {
+    (0..d)
+        .map(|j| (0..slopes.ncols()).map(|c| slopes[(j, c)] * row[d + c]).sum())
         .collect()
 }
 
-/// y minus one regression on p, in the first d rows.
-fn residuals(rows: &Rows) -> Mat<f64> {
-    let all = Responsibilities {
-        total: vec![vec![1.0]; rows.n()],
-        signed: vec![vec![1.0]; rows.n()],
-    };
-    let one = run(rows, &all, 1, 0, 0.0).mixing;
-    let slopes = &one.components[0].slopes;
-    let mut out = Mat::zeros(rows.d, rows.n());
-    for i in 0..rows.n() {
-        for (j, mean) in predict(rows, slopes, i).into_iter().enumerate() {
-            out[(j, i)] = rows.z[(j, i)] - mean;
+/// y minus one regression on p for each configuration, row after row.
+fn residuals(rows: &Rows, tolerance: f64) -> Vec<f64> {
+    let d = rows.settings.d;
+    let one = run(rows, &gather(rows, 1, |_, _| (1.0, 0.0)), 0, tolerance).mixing;
+    let mut out = Vec::with_capacity(rows.n() * d);
+    for cell in 0..rows.ends.len() {
+        for i in rows.cell(cell) {
+            let row = rows.row(i);
+            let mean = predict(d, &one.set(cell)[0].slopes, row);
+            out.extend(row.iter().zip(mean).map(|(y, mean)| y - mean));
         }
     }
     out
 }
 
-/// k-means++ and some Lloyd steps on the first d rows of `features`, softened.
-fn cluster(rows: &Rows, features: &Mat<f64>, k: usize, rng: &mut impl Rng) -> Responsibilities {
-    let n = rows.n();
-    let point = |i: usize| -> Vec<f64> { (0..rows.d).map(|j| features[(j, i)]).collect() };
-    let distance = |i: usize, center: &[f64]| -> (f64, f64) {
+/// k-means++ and some Lloyd steps on y or on the given features, softened. Configurations with components of their own
+/// are clustered apart, heaviest cluster first, so that clusters of one number may share a weight.
+fn cluster(rows: &Rows, features: Option<&[f64]>, k: usize, rng: &mut impl Rng) -> Vec<Vec<Moment>> {
+    let mut labels = vec![(0, 1.0); rows.n()];
+    let together = rows.settings.weights == Weights::Shared;
+    let cells = if together { 1 } else { rows.ends.len() };
+    for cell in 0..cells {
+        let range = if together { 0..rows.n() } else { rows.cell(cell) };
+        if range.is_empty() {
+            continue;
+        }
+        let d = rows.settings.d;
+        let point = |i: usize| match features {
+            Some(features) => &features[i * d..(i + 1) * d],
+            None => &rows.row(i)[..d],
+        };
+        let points: Vec<&[f64]> = range.clone().map(point).collect();
+        let found = k_means(
+            &points,
+            &rows.weights[range.clone()],
+            k,
+            rows.settings.latent_sign,
+            rng,
+        );
+        labels[range].copy_from_slice(&found);
+    }
+    soften(rows, &labels, k)
+}
+
+/// Cluster and sign of each point; clusters are numbered by falling mass.
+fn k_means(
+    points: &[&[f64]],
+    weights: &[f64],
+    k: usize,
+    latent_sign: bool,
+    rng: &mut impl Rng,
+) -> Vec<(usize, f64)> {
+    let n = points.len();
+    let d = points[0].len();
+    let distance = |x: &[f64], center: &[f64]| -> (f64, f64) {
         let (mut plus, mut minus) = (0.0, 0.0);
-        for (j, c) in center.iter().enumerate() {
-            let x = features[(j, i)];
+        for (x, c) in x.iter().zip(center) {
             plus += (x - c) * (x - c);
             minus += (x + c) * (x + c);
         }
-        if rows.latent_sign && minus < plus {
+        if latent_sign && minus < plus {
             (minus, -1.0)
         } else {
             (plus, 1.0)
         }
     };
-    let mut centers = vec![point(draw(&rows.weights, rng))];
+    let mut centers = vec![points[draw(weights, rng)].to_vec()];
     let mut square: Vec<f64> = vec![f64::INFINITY; n];
+    let mut weighted = vec![0.0; n];
     while centers.len() < k {
         let newest = &centers[centers.len() - 1];
         for i in 0..n {
-            square[i] = square[i].min(distance(i, newest).0);
+            square[i] = square[i].min(distance(points[i], newest).0);
+            weighted[i] = square[i] * weights[i];
         }
-        let weighted: Vec<f64> = square.iter().zip(&rows.weights).map(|(s, w)| s * w).collect();
-        centers.push(point(draw(&weighted, rng)));
+        centers.push(points[draw(&weighted, rng)].to_vec());
     }
     let mut label = vec![(0, 1.0); n];
+    let mut masses = vec![0.0; k];
     for _ in 0..LLOYD_STEPS {
+        let mut sums = vec![0.0; k * d];
+        masses.fill(0.0);
         for (i, label) in label.iter_mut().enumerate() {
             let mut least = f64::INFINITY;
             for (c, center) in centers.iter().enumerate() {
-                let (square, sign) = distance(i, center);
+                let (square, sign) = distance(points[i], center);
                 if square < least {
                     least = square;
                     *label = (c, sign);
                 }
             }
-        }
-        let mut sums = vec![(0.0, vec![0.0; rows.d]); k];
-        for (i, &(c, sign)) in label.iter().enumerate() {
-            sums[c].0 += rows.weights[i];
-            for (j, sum) in sums[c].1.iter_mut().enumerate() {
-                *sum += rows.weights[i] * sign * features[(j, i)];
+            let (c, sign) = *label;
+            masses[c] += weights[i];
+            for (sum, x) in sums[c * d..].iter_mut().zip(points[i]) {
+                *sum += weights[i] * sign * x;
             }
         }
-        for (center, (mass, sum)) in centers.iter_mut().zip(sums) {
-            if mass > 0.0 {
-                *center = sum.into_iter().map(|value| value / mass).collect();
+        for (c, center) in centers.iter_mut().enumerate().filter(|(c, _)| masses[*c] > 0.0) {
+            for (value, sum) in center.iter_mut().zip(&sums[c * d..]) {
+                *value = sum / masses[c];
             }
         }
     }
-    soften(rows, &label, k)
+    let mut order: Vec<usize> = (0..k).collect();
+    order.sort_by(|&a, &b| masses[b].total_cmp(&masses[a]));
+    let mut number = vec![0; k];
+    for (new, &old) in order.iter().enumerate() {
+        number[old] = new;
+    }
+    label.into_iter().map(|(c, sign)| (number[c], sign)).collect()
 }
 
-fn soften(rows: &Rows, label: &[(usize, f64)], k: usize) -> Responsibilities {
-    let soft = if k == 1 { 1.0 } else { SOFT };
-    let rest = if k == 1 {
-        0.0
+/// Moments where most of each row goes to its own cluster, with its sign.
+fn soften(rows: &Rows, label: &[(usize, f64)], k: usize) -> Vec<Vec<Moment>> {
+    let (soft, rest) = if k == 1 {
+        (1.0, 0.0)
     } else {
-        (1.0 - SOFT) / (k - 1) as f64
+        (SOFT, (1.0 - SOFT) / (k - 1) as f64)
     };
-    let total: Vec<Vec<f64>> = label
-        .iter()
-        .map(|&(own, _)| (0..k).map(|c| if c == own { soft } else { rest }).collect())
-        .collect();
-    let signed = if rows.latent_sign {
-        label
-            .iter()
-            .zip(&total)
-            .map(|(&(_, sign), row)| row.iter().map(|r| r * sign).collect())
-            .collect()
-    } else {
-        Vec::new()
-    };
-    Responsibilities { total, signed }
+    gather(rows, k, |i, c| {
+        let (own, sign) = label[i];
+        let share = if c == own { soft } else { rest };
+        if sign > 0.0 { (share, 0.0) } else { (0.0, share) }
+    })
 }
 
 /// An index drawn in proportion to weights; the first where all are zero.

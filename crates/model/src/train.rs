@@ -1,18 +1,18 @@
 //! Training: every node by itself, since with all parents observed the likelihood falls apart into families.
 //!
 //! A discrete node gets counts with a Dirichlet prior. A continuous node gets, for each configuration of its discrete
-//! parents (a *cell*), a mixture of linear regressions on its continuous parents. Rows that miss a column of a family
-//! are left out of that family only.
+//! parents (a *cell*), a mixture of linear regressions on its continuous parents. Where cells of the table are missing,
+//! the rows that are complete for a family choose its number of components, and EM over the whole network goes on from
+//! there with all rows.
 
-use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::cell::{CellReport, CellTask, FittedCell, fit_cells};
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::{ModelError, list};
-use crate::evidence::Evidence;
-use crate::family::Family;
+use crate::family::{Cells, Family};
+use crate::gaps::{GapReport, fit_gaps, log_table};
 use crate::model::{Model, Node};
 use crate::network::{MixtureSpec, Network, NodeKind, NodeSpec};
 use crate::table::Table;
@@ -68,6 +68,8 @@ pub struct TrainReport {
     pub n_parameters: usize,
     /// One entry per node, in the network's order.
     pub nodes: Vec<NodeReport>,
+    /// EM over the rows with missing cells; `None` where there are none.
+    pub gaps: Option<GapReport>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -97,18 +99,61 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
     let weights = check_weights(table, options)?;
     let mut warnings = Vec::new();
     let groups = read_groups(network, table, options.group.as_deref(), &mut warnings)?;
-    let mut families = Vec::with_capacity(network.nodes().len());
-    for node in network.nodes() {
-        families.push(Family::read(network, node, table, &weights, groups.as_deref())?);
-    }
+    let table_cells = Cells::read(network, table, weights)?;
+    let families: Vec<Family> = (0..network.nodes().len())
+        .map(|node| Family::read(network, node, &table_cells, groups.as_deref()))
+        .collect();
     let mut tasks = Vec::new();
     for (i, (node, family)) in network.nodes().iter().zip(&families).enumerate() {
         if let NodeKind::Mixture(spec) = &node.kind {
-            check_supported(node, spec)?;
-            tasks.extend(cell_tasks(i, spec, family, options, groups.is_some()));
+            if family.rows.is_empty() {
+                return Err(ModelError::NoRows {
+                    node: node.name.clone(),
+                    n_rows: table.n_rows(),
+                });
+            }
+            tasks.extend(cell_tasks(
+                i,
+                spec,
+                &table_cells,
+                family,
+                options,
+                groups.is_some(),
+            ));
         }
     }
-    let fitted = fit_cells(&tasks);
+    let mut fitted = fit_cells(&tasks);
+    let mut counts: Vec<Vec<Vec<f64>>> = network
+        .nodes()
+        .iter()
+        .zip(&families)
+        .enumerate()
+        .map(|(i, (node, family))| count(i, node, family, &table_cells))
+        .collect();
+    for (node, counts) in network.nodes().iter().zip(&counts) {
+        if let NodeKind::Discrete { states, .. } = &node.kind {
+            let unseen = (0..states.len()).filter(|&state| counts.iter().all(|row| row[state] == 0.0));
+            let unseen: Vec<&str> = unseen.map(|state| states[state].as_str()).collect();
+            if !unseen.is_empty() {
+                warnings.push(format!("`{}`: no row has {}", node.name, list(unseen)));
+            }
+        }
+    }
+    let gaps = fit_gaps(network, &table_cells, &tasks, &mut fitted, &mut counts, options);
+    if let Some(gaps) = &gaps {
+        if gaps.left_out > 0 {
+            warnings.push(format!(
+                "{} of {} rows with gaps have too many combinations; only their complete families were learned from",
+                gaps.left_out, gaps.n_rows
+            ));
+        }
+        if !gaps.converged {
+            warnings.push(format!(
+                "EM over the rows with gaps ended after {} steps without settling",
+                gaps.steps
+            ));
+        }
+    }
     let mut nodes = Vec::with_capacity(families.len());
     let mut reports = Vec::with_capacity(families.len());
     for (i, (node, family)) in network.nodes().iter().zip(&families).enumerate() {
@@ -120,7 +165,7 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
             .collect();
         let mut report = NodeReport {
             name: node.name.clone(),
-            n_rows: family.rows.len(),
+            n_rows: family.n_complete,
             cells: name_cells(network, node, &cells),
         };
         for (cell, fit) in report.cells.iter().zip(&cells) {
@@ -136,17 +181,23 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
             );
         }
         let cpd = match &node.kind {
-            NodeKind::Discrete { states, prior } => {
-                Cpd::Discrete(count(network, node, states, *prior, family, &mut warnings))
-            }
-            NodeKind::Mixture(spec) => Cpd::Mixture(assemble(network, node, spec, family, &cells)),
+            NodeKind::Discrete { states, prior } => Cpd::Discrete(DiscreteCpd {
+                states: states.clone(),
+                parents: discrete_parents(network, node),
+                table: counts[i]
+                    .iter()
+                    .map(|row| log_table(row, *prior).into_iter().map(f64::exp).collect())
+                    .collect(),
+            }),
             NodeKind::VonMisesFisher(spec) => {
-                let trained = train_directions(network, node, spec, table, &weights, options)?;
+                let weights = &table_cells.weights;
+                let trained = train_directions(network, node, spec, table, weights, options)?;
                 report.n_rows = trained.n_rows;
                 report.cells = trained.cells;
                 warnings.extend(trained.warnings);
                 Cpd::VonMisesFisher(trained.cpd)
             }
+            NodeKind::Mixture(spec) => Cpd::Mixture(assemble(network, i, spec, &table_cells, family, &cells)),
         };
         let mut extra = Map::new();
         extra.insert(
@@ -176,27 +227,10 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
         log_likelihood,
         n_parameters,
         nodes: reports,
+        gaps,
         warnings,
     };
     Ok(Trained { model, report })
-}
-
-impl Model {
-    /// Log density of what each row tells about the nodes: exact also where cells are missing. A row that tells nothing
-    /// gives 0.
-    ///
-    /// # Errors
-    ///
-    /// A cell of the wrong kind, or evidence without density.
-    pub fn log_likelihood(&self, table: &Table) -> Result<Vec<f64>, ModelError> {
-        let rows = Evidence::from_table(self, table)?;
-        rows.par_iter()
-            .map(|row| match self.log_evidence(row) {
-                Err(ModelError::ImpossibleEvidence { .. }) => Ok(f64::NEG_INFINITY),
-                other => other,
-            })
-            .collect()
-    }
 }
 
 fn check_weights(table: &Table, options: &TrainOptions) -> Result<Vec<f64>, ModelError> {
@@ -261,36 +295,28 @@ pub(crate) fn read_groups(
     ))
 }
 
-fn check_supported(node: &NodeSpec, spec: &MixtureSpec) -> Result<(), ModelError> {
-    if spec.weights != Weights::Root {
-        return Ok(());
-    }
-    Err(ModelError::BadSetting {
-        node: node.name.clone(),
-        key: "weights".into(),
-        found: "\"root\"".into(),
-        expected: "\"per-configuration\" or \"shared\"; \"root\" is not supported yet".into(),
-    })
-}
-
 /// One task per configuration, or a single one where the components are shared.
 fn cell_tasks<'a>(
     node: usize,
     spec: &'a MixtureSpec,
+    cells: &'a Cells,
     family: &'a Family,
     options: &TrainOptions,
     grouped: bool,
 ) -> Vec<CellTask<'a>> {
-    let cells: Vec<Option<usize>> = match spec.weights {
-        Weights::Shared => vec![None],
-        _ => (0..family.n_configurations).map(Some).collect(),
+    let together = spec.weights != Weights::PerConfiguration || spec.shared_covariance;
+    let configurations: Vec<Option<usize>> = if together && family.ends.len() > 1 {
+        vec![None]
+    } else {
+        (0..family.ends.len()).map(Some).collect()
     };
-    cells
+    configurations
         .into_iter()
         .map(|cell| CellTask {
             node,
             cell,
             spec,
+            cells,
             family,
             options: options.clone(),
             grouped,
@@ -336,83 +362,53 @@ fn discrete_parents(network: &Network, node: &NodeSpec) -> Vec<NodeIdx> {
         .collect()
 }
 
-fn count(
-    network: &Network,
-    node: &NodeSpec,
-    states: &[String],
-    prior: f64,
-    family: &Family,
-    warnings: &mut Vec<String>,
-) -> DiscreteCpd {
-    let n = states.len();
-    let mut table = vec![vec![prior; n]; family.n_configurations];
-    for (i, &state) in family.states.iter().enumerate() {
-        table[family.configurations[i]][state] += family.weights[i];
-    }
-    let mut seen = vec![0.0; n];
-    for (i, &state) in family.states.iter().enumerate() {
-        seen[state] += family.weights[i];
-    }
-    let unseen = states
-        .iter()
-        .zip(&seen)
-        .filter(|(_, mass)| **mass == 0.0)
-        .map(|(state, _)| state.as_str());
-    let unseen: Vec<&str> = unseen.collect();
-    if !unseen.is_empty() {
-        warnings.push(format!("`{}`: no row has {}", node.name, list(unseen)));
-    }
-    for row in &mut table {
-        let total: f64 = row.iter().sum();
-        for entry in row.iter_mut() {
-            *entry = if total > 0.0 {
-                *entry / total
-            } else {
-                1.0 / n as f64
-            };
+/// Weight of each state under each configuration, over the rows where both are known; nothing for a continuous node.
+fn count(position: usize, node: &NodeSpec, family: &Family, cells: &Cells) -> Vec<Vec<f64>> {
+    let NodeKind::Discrete { states, .. } = &node.kind else {
+        return Vec::new();
+    };
+    let mut counts = vec![vec![0.0; states.len()]; family.ends.len()];
+    for (configuration, counts) in counts.iter_mut().enumerate() {
+        for &row in &family.rows[family.members(Some(configuration))] {
+            if let Some(state) = cells.states[position][row] {
+                counts[state] += cells.weights[row];
+            }
         }
     }
-    DiscreteCpd {
-        states: states.to_vec(),
-        parents: discrete_parents(network, node),
-        table,
-    }
+    counts
 }
 
 /// Turns standardised regressions back into the columns' units.
 fn assemble(
     network: &Network,
-    node: &NodeSpec,
+    position: usize,
     spec: &MixtureSpec,
+    table_cells: &Cells,
     family: &Family,
     cells: &[&FittedCell],
 ) -> MixtureCpd {
-    let d = spec.columns.len();
-    let q = family.parent_scaling.mean.len();
-    let unit = &family.scaling;
-    let mut components = Vec::with_capacity(family.n_configurations);
-    for configuration in 0..family.n_configurations {
-        // Shared components come from one cell with one set of weights per configuration.
-        let (cell, row) = if cells.len() == 1 {
-            (cells[0], configuration)
-        } else {
-            (cells[configuration], 0)
+    let node = &network.nodes()[position];
+    let unit = &table_cells.scaling[position];
+    let parent_unit = table_cells.parent_scaling(network, position);
+    let (d, q) = (spec.columns.len(), parent_unit.mean.len());
+    let mut components = Vec::with_capacity(family.ends.len());
+    for configuration in 0..family.ends.len() {
+        // Configurations that share something come from one cell.
+        let (cell, row) = match cells {
+            [all] => (*all, configuration),
+            each => (each[configuration], 0),
         };
-        let row = row.min(cell.mixing.log_weights.len() - 1);
         let weights: Vec<f64> = cell.mixing.log_weights[row]
             .iter()
             .map(|log_weight| log_weight.exp())
             .collect();
         let total: f64 = weights.iter().sum();
-        let parts = cell.mixing.components.iter().zip(weights).map(|(part, weight)| {
+        let parts = cell.mixing.set(row).iter().zip(weights).map(|(part, weight)| {
             let coefficients = nalgebra::DMatrix::from_fn(d, q, |i, j| {
-                part.slopes[(i, j + 1)] * unit.standard_deviation[i]
-                    / family.parent_scaling.standard_deviation[j]
+                part.slopes[(i, j + 1)] * unit.standard_deviation[i] / parent_unit.standard_deviation[j]
             });
             let mean = nalgebra::DVector::from_fn(d, |i, _| {
-                let pulled: f64 = (0..q)
-                    .map(|j| coefficients[(i, j)] * family.parent_scaling.mean[j])
-                    .sum();
+                let pulled: f64 = (0..q).map(|j| coefficients[(i, j)] * parent_unit.mean[j]).sum();
                 unit.mean[i] + unit.standard_deviation[i] * part.slopes[(i, 0)] - pulled
             });
             let covariance = nalgebra::DMatrix::from_fn(d, d, |i, j| {

@@ -13,10 +13,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::cpd::{Sign, Weights, n_mixture_parameters};
-use crate::em::{CovariancePrior, Mixing, RIDGE, Rows, row_log_densities};
+use crate::em::{Rows, row_log_densities};
 use crate::error::ModelError;
-use crate::family::Family;
-use crate::network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, VonMisesFisherSpec};
+use crate::family::Cells;
+use crate::moments::{CovariancePrior, Mixing, RIDGE, Settings};
+use crate::network::{MixtureOrder, MixtureSpec, Network, NodeKind, VonMisesFisherSpec};
 use crate::start::{FitOptions, fit_mixture};
 use crate::table::Table;
 use crate::von_mises_fisher::n_direction_parameters;
@@ -106,18 +107,14 @@ impl Scorer {
         effort: FitEffort,
     ) -> Result<Self, ModelError> {
         let n = table.n_rows();
-        let weights = vec![1.0; n];
+        let cells = Cells::read(network, table, vec![1.0; n])?;
         let mut nodes = Vec::with_capacity(network.nodes().len());
-        for node in network.nodes() {
+        for (i, node) in network.nodes().iter().enumerate() {
             let mut share = 1.0;
-            let alone = NodeSpec {
-                parents: Vec::new(),
-                ..node.clone()
-            };
-            let family = || Family::read(network, &alone, table, &weights, None);
             let values = match &node.kind {
                 NodeKind::Discrete { states, prior } => Values::Discrete {
-                    states: family()?.states,
+                    // Rows are complete.
+                    states: cells.states[i].iter().map(|state| state.unwrap_or(0)).collect(),
                     n_states: states.len(),
                     prior: *prior,
                 },
@@ -136,15 +133,17 @@ impl Scorer {
                     }
                 }
                 NodeKind::Mixture(spec) => {
-                    let family = family()?;
+                    let y: Vec<Vec<f64>> = (0..n)
+                        .map(|row| cells.values[i].iter().map(|column| column[row]).collect())
+                        .collect();
                     if let Some(groups) = groups {
-                        share = share_of_constant(&family.y, groups);
+                        share = share_of_constant(&y, groups);
                     }
-                    let unit = &family.scaling.standard_deviation;
+                    let unit = &cells.scaling[i].standard_deviation;
                     Values::Continuous {
                         floor: spec.noise_floor.iter().zip(unit).map(|(f, s)| f / s).collect(),
                         log_unit: unit.iter().map(|s| s.ln()).sum(),
-                        y: family.y,
+                        y,
                         spec: spec.clone(),
                     }
                 }
@@ -419,7 +418,7 @@ impl MixtureFamily<'_> {
         (0..n_cells)
             .map(|cell| {
                 let rows = self.rows(members, &self.of_cell(members, among, cell));
-                if n_cells == 1 || rows.total_weight() >= rows.least_mass() {
+                if n_cells == 1 || rows.total_weight() >= rows.settings.least_mass() {
                     return self.best(&rows, cell, log_n);
                 }
                 // Too few rows: one component over all configurations stands in, as in training. It costs as much as
@@ -439,14 +438,14 @@ impl MixtureFamily<'_> {
 
     /// As many components as the score asks for: more while each is worth its price.
     fn best(&self, rows: &Rows, cell: usize, log_n: f64) -> CellFit {
-        let carried = (rows.total_weight() / rows.least_mass()) as usize;
+        let carried = (rows.total_weight() / rows.settings.least_mass()) as usize;
         let most = match self.spec.order {
             MixtureOrder::Fixed(k) => {
                 return self.fit_one(rows, k.min(carried).max(1), cell, self.scorer.max_steps);
             }
             MixtureOrder::Bic { max, .. } => max.min(self.scorer.max_components),
         };
-        let one = n_mixture_parameters(1, rows.d, rows.q()) as f64;
+        let one = n_mixture_parameters(1, rows.settings.d, rows.settings.q) as f64;
         let most = most
             .min((rows.total_weight() / (ROWS_PER_PARAMETER * one)) as usize)
             .min(carried);
@@ -475,11 +474,9 @@ impl MixtureFamily<'_> {
             tolerance: 1e-5,
         };
         let mut rng = ChaCha8Rng::seed_from_u64(mixed(self.stream, k, &[cell]));
-        let fit = fit_mixture(rows, k, options, &mut rng).fit;
-        let k = fit.mixing.components.len();
-        let gaussians = n_mixture_parameters(k, rows.d, rows.q()) - (k - 1);
+        let fit = fit_mixture(rows, k, None, options, &mut rng).fit;
         CellFit {
-            n_parameters: gaussians + rows.n_cells * (k - 1),
+            n_parameters: rows.settings.n_parameters(fit.mixing.k(), rows.ends.len()),
             log_likelihood: fit.log_likelihood,
             mixing: fit.mixing,
         }
@@ -487,44 +484,47 @@ impl MixtureFamily<'_> {
 
     fn rows(&self, members: &Members, cell: &[usize]) -> Rows {
         let d = self.spec.columns.len();
-        let mut values = Vec::with_capacity(cell.len());
-        for &i in cell {
-            let row = members.rows[i];
-            let mut z = self.y[row].clone();
-            z.push(1.0);
-            for parent in &self.parents {
-                z.extend_from_slice(&parent[row]);
-            }
-            values.push(z);
-        }
         let q = self
             .parents
             .iter()
             .map(|parent| parent.first().map_or(0, Vec::len))
             .sum::<usize>();
+        // Shared components have weights for each configuration, whose rows stand together.
+        let mut cell = cell.to_vec();
+        let mut ends = vec![cell.len()];
+        if self.shared() {
+            cell.sort_by_key(|&i| members.configurations[i]);
+            ends = (0..members.n_configurations)
+                .map(|end| cell.partition_point(|&i| members.configurations[i] <= end))
+                .collect();
+        }
+        let mut z = Vec::with_capacity(cell.len() * (d + 1 + q));
+        for &i in &cell {
+            let row = members.rows[i];
+            z.extend_from_slice(&self.y[row]);
+            z.push(1.0);
+            for parent in &self.parents {
+                z.extend_from_slice(&parent[row]);
+            }
+        }
         Rows {
-            d,
-            z: faer::Mat::from_fn(d + 1 + q, cell.len(), |i, j| values[j][i]),
-            weights: cell.iter().map(|&i| members.weights[i]).collect(),
-            cell: cell
-                .iter()
-                .map(|&i| {
-                    if self.shared() {
-                        members.configurations[i]
-                    } else {
-                        0
-                    }
-                })
-                .collect(),
-            n_cells: if self.shared() {
-                members.n_configurations
-            } else {
-                1
+            settings: Settings {
+                d,
+                q,
+                weights: if self.shared() {
+                    Weights::Shared
+                } else {
+                    Weights::PerConfiguration
+                },
+                tied: self.spec.shared_covariance,
+                floor: self.floor.to_vec(),
+                latent_sign: self.spec.sign == Sign::Latent,
+                ridge: vec![RIDGE; 1 + q],
+                prior: CovariancePrior::WEAK,
             },
-            floor: self.floor.to_vec(),
-            latent_sign: self.spec.sign == Sign::Latent,
-            ridge: vec![RIDGE; 1 + q],
-            prior: CovariancePrior::WEAK,
+            z,
+            weights: cell.iter().map(|&i| members.weights[i]).collect(),
+            ends,
         }
     }
 }
