@@ -43,16 +43,21 @@ impl MinimumBox {
 /// The box of least volume around `points`, at any orientation.
 ///
 /// The convex hull is measured by rotating calipers about some 110 directions: normals of its largest facets, and a
-/// lattice along its principal axes. About a given axis the calipers are exact. The twelve best boxes are then turned
-/// downhill, each step minimising the linearised volume exactly, until no small turn helps.
+/// lattice along its principal axes, and on hulls of up to 24 corners also 240 normals of planes that hold an edge. About a
+/// given axis the calipers are exact. The best of these boxes, 12 to 60,
+/// are turned downhill, each step minimising the linearised volume exactly, until no small turn helps.
 ///
 /// Which of several equally small boxes is meant depends on the frame of the points:
 ///
 /// - the axes are matched to x, y, z by the assignment with the largest Σ |axis · e|, with axis · e ≥ 0, and are
 ///   right-handed; they are not sorted by length;
-/// - among boxes within 5e-7 of the least volume, the one that is turned least from the frame is taken;
-/// - a box with an axis along x, y or z is preferred up to 5e-4 above the least volume, so that round bodies
-///   (bottles, glasses) stand upright instead of following their tessellation; among those, the box along all three.
+/// - boxes within 5e-7 of the least volume count as equal;
+/// - among equal boxes one along x, y and z is taken, or else one with an axis along x, y or z, or else the one that is
+///   turned least from the frame: a body of revolution (bottle, glass) stands upright whatever its tessellation.
+///
+/// So the volume is the same to 1e-6 however the points are turned, scaled, shuffled or moved; and so is the box, where no
+/// other one is equal to it. The least volume itself is found by search, not proved: see the tables in
+/// `docs/geometry.md`.
 ///
 /// Points in a plane give the rectangle of least area and an extent of 0, collinear points a segment, equal points
 /// a point. Every input point lies in the box up to rounding.

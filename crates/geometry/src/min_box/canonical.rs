@@ -5,14 +5,11 @@ use nalgebra::{Matrix3, Vector3};
 /// Boxes whose volumes differ by less than this share count as equal.
 const EQUAL: f64 = 5e-7;
 
-/// A box along the frame may be larger than the smallest by this share.
-///
-/// Upright boxes of a body of revolution differ from the smallest box of its polygons by less than this from about
-/// 50 sides on where that box is tilted. It is too little to matter as a length: 0.2 mm on a side of a 0.4 m object.
-const FRAME_PREFERENCE: f64 = 5e-4;
+/// Axes this close (cosine) belong to one box, of which the smallest variant is meant.
+const SAME_BOX: f64 = 1.0 - 1e-4;
 
-/// |axis · e| above this counts as along the frame's axis.
-const ALONG: f64 = 1.0 - 1e-15;
+/// An axis whose other two coordinates are below this is along the frame's axis.
+const ALONG: f64 = 1e-15;
 
 /// Axes of a box (orthonormal columns) and how large it is: its volume, or for flat points its area.
 #[derive(Debug, Clone, Copy)]
@@ -24,31 +21,40 @@ pub(super) struct Candidate {
 /// The axes that the rules of [`super::minimum_volume_box`] ask for. `candidates` must not be empty.
 pub(super) fn choose(candidates: &[Candidate]) -> Matrix3<f64> {
     let least = candidates.iter().map(|c| c.size).fold(f64::INFINITY, f64::min);
-    let preferred = candidates
-        .iter()
-        .filter(|c| c.size <= least * (1.0 + FRAME_PREFERENCE));
-    let n_along = |c: &Candidate| (0..3).filter(|&k| c.axes.column(k).amax() >= ALONG).count();
-    for wanted in [3, 1] {
-        let along = preferred.clone().filter(|c| n_along(c) >= wanted);
-        let least = along.clone().map(|c| c.size).fold(f64::INFINITY, f64::min);
-        if let Some(axes) = least_turned(along.filter(|c| c.size <= least * (1.0 + EQUAL))) {
-            return axes;
+    let equal = candidates.iter().filter(|c| c.size <= least * (1.0 + EQUAL));
+    let is_along = |axis: Vector3<f64>| (0..3).filter(|&k| axis[k].abs() <= ALONG).count() == 2;
+    let n_along = |c: &Candidate| (0..3).filter(|&k| is_along(c.axes.column(k).into())).count();
+    for wanted in [3, 1, 0] {
+        if let Some(axes) = least_turned(equal.clone().filter(|c| n_along(c) >= wanted)) {
+            return without_rounding(&axes);
         }
     }
-    least_turned(candidates.iter().filter(|c| c.size <= least * (1.0 + EQUAL)))
-        .unwrap_or_else(Matrix3::identity)
+    Matrix3::identity()
 }
 
-/// Of some boxes the one turned least from the frame; the first of equals.
+/// Axes along the frame's up to rounding are exactly along it.
+fn without_rounding(axes: &Matrix3<f64>) -> Matrix3<f64> {
+    axes.map(|x| match x.abs() {
+        size if size <= ALONG => 0.0,
+        size if 1.0 - size <= ALONG => x.signum(),
+        _ => x,
+    })
+}
+
+/// Of some boxes the one turned least from the frame; the smallest of those that differ from it only by rounding.
 fn least_turned<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> Option<Matrix3<f64>> {
-    let mut best: Option<(Matrix3<f64>, f64)> = None;
-    for candidate in candidates {
-        let (axes, trace) = nearest_to_frame(&candidate.axes);
-        if best.is_none_or(|(_, most)| trace > most + 1e-9) {
-            best = Some((axes, trace));
-        }
-    }
-    best.map(|(axes, _)| axes)
+    let framed = candidates.map(|c| (nearest_to_frame(&c.axes), c.size));
+    let framed: Vec<((Matrix3<f64>, f64), f64)> = framed.collect();
+    let ((nearest, _), _) = framed.iter().copied().reduce(|best, other| {
+        // The first of equals.
+        if other.0.1 > best.0.1 + 1e-9 { other } else { best }
+    })?;
+    let is_same = |axes: &Matrix3<f64>| (0..3).all(|k| axes.column(k).dot(&nearest.column(k)) > SAME_BOX);
+    framed
+        .iter()
+        .filter(|((axes, _), _)| is_same(axes))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|((axes, _), _)| *axes)
 }
 
 /// The columns matched to x, y, z by the assignment with the largest Σ |axis · e| and with axis · e ≥ 0; and that sum.

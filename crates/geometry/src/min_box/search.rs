@@ -1,5 +1,7 @@
 //! The search over orientations.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::body::{Body, Scratch, perpendicular};
@@ -10,13 +12,38 @@ use crate::planar::{flush_rectangles, planar_hull};
 
 /// Hull facets whose normals are tried, largest first.
 const N_FACETS: usize = 32;
-/// Boxes that are turned downhill.
-const N_STARTS: usize = 12;
+/// So many boxes are turned downhill in any case, and so many at most.
+const MIN_STARTS: usize = 12;
+const MAX_STARTS: usize = 60;
+/// Between the two, boxes up to this factor above the smallest so far are: on round clouds, nearly all lead far down.
+const START_WINDOW: f64 = 1.2;
+/// With at most so many corners, normals of planes that touch an edge are tried as well, so many in all.
+const SMALL_HULL: usize = 24;
+const N_EDGE_NORMALS: usize = 240;
+/// Longest first turns (rad) of a descent, and what a step must promise (share of the volume): first to tell the basins
+/// apart, then to reach the bottom of the best.
+const START_REACH: f64 = 0.1;
+const ROUGH: f64 = 1e-3;
+const END_REACH: f64 = 0.02;
+const FINE: f64 = 1e-11;
+/// Boxes up to this factor above the smallest are followed to the bottom.
+const END_WINDOW: f64 = 1.01;
+
+/// Facets at a smaller angle (rad) are one.
+const FLAT_EDGE: f64 = 1e-6;
 
 /// Corners and triangles of a hull, moved to the origin and scaled to a size near 1.
 pub(super) struct UnitHull {
     pub(super) points: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
+}
+
+impl UnitHull {
+    /// Twice the area of a triangle, along its outward normal.
+    fn area_vector(&self, triangle: &[u32; 3]) -> Vector3<f64> {
+        let [a, b, c] = triangle.map(|v| self.points[v as usize]);
+        (b - a).cross(&(c - a))
+    }
 }
 
 pub(super) fn to_unit_size(hull: &ConvexHull) -> UnitHull {
@@ -40,8 +67,14 @@ pub(super) fn to_unit_size(hull: &ConvexHull) -> UnitHull {
 
 /// Candidates for flat points: the rectangles flush with an edge, and the one along the frame where that is possible.
 pub(super) fn flat(hull: &UnitHull) -> Vec<Candidate> {
-    let [a, b, c] = hull.triangles[0].map(|v| hull.points[v as usize]);
-    let normal = (b - a).cross(&(c - a)).normalize();
+    // Every other triangle is a back side. Single triangles may be slivers, with normals of rounding.
+    let normal: Vector3<f64> = hull
+        .triangles
+        .iter()
+        .step_by(2)
+        .map(|t| hull.area_vector(t))
+        .sum();
+    let normal = normal.normalize();
     let (u, v) = perpendicular(&normal);
     let plane: Vec<[f64; 2]> = hull.points.iter().map(|p| [u.dot(p), v.dot(p)]).collect();
     let polygon: Vec<[f64; 2]> = planar_hull(&plane).iter().map(|&i| plane[i as usize]).collect();
@@ -75,6 +108,9 @@ pub(super) fn solid(hull: &UnitHull, hints: &[Vector3<f64>]) -> Vec<Candidate> {
     let mut directions: Vec<Vector3<f64>> = hints.to_vec();
     directions.extend(facet_normals(hull));
     directions.extend(lattice().map(|d| frame * d));
+    if hull.points.len() <= SMALL_HULL {
+        directions.extend(edge_normals(hull));
+    }
 
     let mut candidates = vec![Candidate {
         axes: Matrix3::identity(),
@@ -89,30 +125,32 @@ pub(super) fn solid(hull: &UnitHull, hints: &[Vector3<f64>]) -> Vec<Candidate> {
         .collect();
     all.extend(candidates.iter().copied().min_by(by_size));
     all.sort_by(by_size);
-    let mut starts: Vec<Candidate> = Vec::new();
+    let mut tried: Vec<Candidate> = Vec::new();
+    let mut ends: Vec<Candidate> = Vec::new();
+    let mut least = f64::INFINITY;
     for candidate in all {
-        if !starts.iter().any(|known| is_near(known, &candidate)) {
-            starts.push(candidate);
-            if starts.len() == N_STARTS {
-                break;
-            }
+        if tried.iter().any(|known| is_near(known, &candidate)) {
+            continue;
         }
+        tried.push(candidate);
+        if ends.len() >= MIN_STARTS && candidate.size > least * START_WINDOW || ends.len() == MAX_STARTS {
+            break;
+        }
+        let end = descend(&body, &candidate.axes, START_REACH, ROUGH);
+        least = least.min(end.size);
+        ends.push(end);
     }
-    for start in &mut starts {
-        *start = descend(&body, &start.axes, 0.1, 1e-3);
+    ends.retain(|end| end.size <= least * END_WINDOW);
+    for end in &mut ends {
+        *end = descend(&body, &end.axes, END_REACH, FINE);
     }
-    starts.sort_by(by_size);
-    let least = starts[0].size;
-    starts.retain(|s| s.size < least * 1.01);
-    for start in &mut starts {
-        *start = descend(&body, &start.axes, 0.02, 1e-11);
-    }
-    starts.sort_by(by_size);
+    ends.sort_by(by_size);
+    // Where several boxes about one axis are equally small, all of them are wanted.
     for k in 0..3 {
-        let axis = starts[0].axes.column(k).into();
+        let axis = ends[0].axes.column(k).into();
         body.boxes_about(&axis, &mut scratch, |c| candidates.push(c));
     }
-    candidates.extend(starts);
+    candidates.extend(ends);
     candidates
 }
 
@@ -127,8 +165,7 @@ fn facet_normals(hull: &UnitHull) -> Vec<Vector3<f64>> {
     let mut facets: Vec<(f64, Vector3<f64>)> = hull
         .triangles
         .iter()
-        .map(|t| t.map(|v| hull.points[v as usize]))
-        .map(|[a, b, c]| (b - a).cross(&(c - a)))
+        .map(|t| hull.area_vector(t))
         .filter_map(|n| Some((n.norm(), n.try_normalize(0.0)?)))
         .collect();
     facets.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -140,6 +177,36 @@ fn facet_normals(hull: &UnitHull) -> Vec<Vector3<f64>> {
         if normals.iter().all(|n| n.dot(&normal).abs() < 1.0 - 1e-4) {
             normals.push(normal);
         }
+    }
+    normals
+}
+
+/// Directions spread over the arcs from facet normal to facet normal across each edge.
+///
+/// In a box of least volume two faces that meet hold an edge of the hull each (O'Rourke 1985). One edge gives an arc of
+/// normals, and calipers about such a normal find the other edge: these arcs are all that has to be searched.
+fn edge_normals(hull: &UnitHull) -> Vec<Vector3<f64>> {
+    let sides = hull.triangles.iter().filter_map(|t| {
+        let normal = hull.area_vector(t).try_normalize(0.0)?;
+        Some([[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]].map(|edge| (edge, normal)))
+    });
+    let of_edge: BTreeMap<[u32; 2], Vector3<f64>> = sides.flatten().collect();
+    let n_steps = (N_EDGE_NORMALS / (of_edge.len() / 2).max(1)).max(1);
+    let mut normals = Vec::new();
+    for (&[a, b], here) in of_edge.iter().filter(|([a, b], _)| a < b) {
+        let Some(there) = of_edge.get(&[b, a]) else {
+            continue;
+        };
+        let angle = here.cross(there).norm().atan2(here.dot(there));
+        let axis = here.cross(there);
+        if angle < FLAT_EDGE {
+            continue;
+        }
+        let aside = axis.cross(here).normalize();
+        normals.extend((0..n_steps).map(|i| {
+            let (sine, cosine) = (angle * (i as f64 + 0.5) / n_steps as f64).sin_cos();
+            here * cosine + aside * sine
+        }));
     }
     normals
 }
