@@ -173,7 +173,10 @@ fn a_corner_tetrahedron_leaves_five_sixths_of_a_unit_cube() {
         assert_close(&answer["fvol"], 5.0 / 6.0);
         assert_close(&answer["fvol_union"], 5.0 / 6.0);
     }
+    assert_close(&lines[1]["fvol_hull"], 5.0 / 6.0);
+    assert_eq!(lines[0].get("fvol_hull"), None, "no contacts to span a hull");
     assert_close(&lines[2]["fvol"], 1.0);
+    assert_close(&lines[2]["fvol_hull"], 1.0);
     assert_eq!(
         lines[2]["line"],
         json!(4),

@@ -1,7 +1,7 @@
 //! The features of a grasp: what the network is told of object, action and constraint.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use prehend_geometry::{OrientedBox, largest_tetrahedron, union_volume};
+use prehend_geometry::{OrientedBox, Tetrahedron, convex_hull, largest_tetrahedron, union_volume};
 
 /// Radius (m) of the sphere on which palm positions are measured, for all objects and hands.
 pub const UPOS_RADIUS: f64 = 0.30;
@@ -85,6 +85,59 @@ pub struct FreeVolume {
 pub fn free_volume(palm: &Point3<f64>, contacts: &[Point3<f64>], boxes: &[OrientedBox]) -> FreeVolume {
     let all: f64 = boxes.iter().map(OrientedBox::volume).sum();
     free_volume_with(palm, contacts, boxes, all, union_volume(boxes))
+}
+
+/// [`free_volume`] with the convex hull of the palm and all contacts for Δ: what the whole hand encloses.
+///
+/// At most what [`free_volume`] gives, in [0, 1]; 1 where palm and contacts lie in one plane or are fewer than four, where
+/// one of them is not finite, and for an object without boxes. The order of the contacts does not matter beyond rounding.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use prehend_geometry::OrientedBox;
+///
+/// // Four contacts and the palm span a pyramid, a third of its cube; the largest tetrahedron is half of it.
+/// let cube = OrientedBox::new(Point3::new(0.5, 0.5, 0.5), nalgebra::Rotation3::identity(), [1.0; 3].into())?;
+/// let palm = Point3::new(0.5, 0.5, 1.0);
+/// let contacts = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Point3::new(x, y, 0.0));
+/// let of_hull = prehend_grasp::free_volume_of_hull(&palm, &contacts, &[cube]);
+/// assert!((of_hull.fvol - 2.0 / 3.0).abs() < 1e-12);
+/// assert!((prehend_grasp::free_volume(&palm, &contacts, &[cube]).fvol - 5.0 / 6.0).abs() < 1e-12);
+/// # Ok::<(), prehend_geometry::GeometryError>(())
+/// ```
+pub fn free_volume_of_hull(
+    palm: &Point3<f64>,
+    contacts: &[Point3<f64>],
+    boxes: &[OrientedBox],
+) -> FreeVolume {
+    let sum: f64 = boxes.iter().map(OrientedBox::volume).sum();
+    let union = union_volume(boxes);
+    let points: Vec<Point3<f64>> = std::iter::once(palm).chain(contacts).copied().collect();
+    let (mut covered, mut covered_once) = (0.0, 0.0);
+    if let Ok(hull) = convex_hull(&points)
+        && hull.rank() == 3
+        && sum > 0.0
+    {
+        // Faces and one corner span tetrahedra that share faces only; those of the corner's own faces are flat.
+        let apex = hull.points()[0];
+        for face in hull.triangles().iter().filter(|face| !face.contains(&0)) {
+            let [a, b, c] = face.map(|i| hull.points()[i as usize]);
+            let part = Tetrahedron([apex, a, b, c]);
+            covered += boxes.iter().map(|b| part.intersection_volume(b)).sum::<f64>();
+            covered_once += part.union_volume(boxes);
+        }
+    }
+    let free = |covered: f64, all: f64| {
+        if covered > 0.0 {
+            (1.0 - covered / all).clamp(0.0, 1.0)
+        } else {
+            1.0
+        }
+    };
+    FreeVolume {
+        fvol: free(covered, sum),
+        fvol_union: free(covered_once, union),
+    }
 }
 
 /// [`free_volume`] where the volumes of all boxes are already known.
@@ -178,5 +231,35 @@ mod tests {
         let cube = OrientedBox::centered([1.0; 3]);
         let free = free_volume(&Point3::origin(), &[cube.min_corner(); 2], &[cube]);
         assert_eq!((free.fvol, free.fvol_union), (1.0, 1.0));
+    }
+
+    #[test]
+    fn the_hull_covers_no_less_than_the_largest_tetrahedron_and_flat_ones_nothing() {
+        let cube = OrientedBox::centered([0.1; 3]);
+        let palm = Point3::new(0.0, 0.01, 0.07);
+        let contacts: Vec<_> = (0..12)
+            .map(|i| {
+                let turn = f64::from(i) * 2.4;
+                Point3::new(0.05 * turn.cos(), 0.05 * turn.sin(), 0.004 * f64::from(i) - 0.03)
+            })
+            .collect();
+        let of_hull = free_volume_of_hull(&palm, &contacts, &[cube]);
+        assert!(of_hull.fvol < free_volume(&palm, &contacts, &[cube]).fvol - 0.01);
+        let mut reversed = contacts.clone();
+        reversed.reverse();
+        assert!((free_volume_of_hull(&palm, &reversed, &[cube]).fvol - of_hull.fvol).abs() < 1e-12);
+        // Three contacts span the tetrahedron itself.
+        let three = &contacts[..3];
+        let same = free_volume(&palm, three, &[cube, cube]);
+        assert!((free_volume_of_hull(&palm, three, &[cube, cube]).fvol - same.fvol).abs() < 1e-12);
+        let flat: Vec<_> = contacts.iter().map(|p| Point3::new(p.x, p.y, 0.07)).collect();
+        for (contacts, boxes) in [
+            (&flat[..], &[cube][..]),
+            (&contacts[..2], &[cube]),
+            (&contacts, &[]),
+        ] {
+            let free = free_volume_of_hull(&palm, contacts, boxes);
+            assert_eq!((free.fvol, free.fvol_union), (1.0, 1.0));
+        }
     }
 }

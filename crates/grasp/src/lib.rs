@@ -47,6 +47,7 @@ mod approach;
 mod closing;
 mod contacts;
 mod features;
+mod free_surface;
 
 mod close;
 mod synthesize;
@@ -57,7 +58,11 @@ mod testing;
 pub use close::{CloseOptions, Closed, close};
 pub use contacts::{CONTACT_TOLERANCE, MERGE_DISTANCE};
 pub use error::GraspError;
-pub use features::{FreeVolume, UPOS_RADIUS, free_volume, object_size, palm_orientation, unified_position};
+pub use features::{
+    FreeVolume, UPOS_RADIUS, free_volume, free_volume_of_hull, object_size, palm_orientation,
+    unified_position,
+};
+pub use free_surface::{FreeSurface, free_surface};
 pub use grasp::{Features, Grasp, LinkContact};
 pub use hypothesis::{Face, Hypothesis, OPENING_MARGIN, PALM_CLEARANCE, hypotheses};
 pub use object::{GraspObject, Region};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use nalgebra::Point3;
 use prehend::geometry::{OrientedBox, Tetrahedron, largest_tetrahedron, union_volume};
+use prehend::grasp::free_volume_of_hull;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -42,11 +43,13 @@ fn free_volume(value: Value) -> Result<Value> {
     if line.boxes.is_empty() {
         bail!("`boxes` is empty; the free volume of nothing is not defined");
     }
-    let tetrahedron = match (line.tetrahedron, line.palm, line.contacts) {
-        (Some(corners), None, None) => Some(Tetrahedron(corners.map(Point3::from))),
+    let (tetrahedron, fvol_hull) = match (line.tetrahedron, line.palm, line.contacts) {
+        (Some(corners), None, None) => (Some(Tetrahedron(corners.map(Point3::from))), None),
         (None, Some(palm), Some(contacts)) => {
+            let palm = Point3::from(palm);
             let contacts: Vec<Point3<f64>> = contacts.into_iter().map(Point3::from).collect();
-            largest_tetrahedron(Point3::from(palm), &contacts)
+            let of_hull = free_volume_of_hull(&palm, &contacts, &line.boxes);
+            (largest_tetrahedron(palm, &contacts), Some(of_hull.fvol))
         }
         _ => bail!("expected either `tetrahedron`, or `palm` and `contacts`"),
     };
@@ -67,11 +70,15 @@ fn free_volume(value: Value) -> Result<Value> {
     let occupied: f64 = per_box.iter().sum();
     let occupied_once = tetrahedron.map_or(0.0, |t| t.union_volume(&line.boxes));
     let fvol_union = 1.0 - occupied_once / union_volume(&line.boxes);
-    Ok(json!({
+    let mut answer = json!({
         "tetrahedron": tetrahedron.map_or(0.0, |t| t.volume()),
         "occupied": occupied,
         "per_box": per_box,
         "fvol": (1.0 - occupied / total).clamp(0.0, 1.0),
         "fvol_union": fvol_union.clamp(0.0, 1.0),
-    }))
+    });
+    if let Some(fvol_hull) = fvol_hull {
+        answer["fvol_hull"] = json!(fvol_hull);
+    }
+    Ok(answer)
 }
