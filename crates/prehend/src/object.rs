@@ -1,10 +1,11 @@
 //! Objects: a mesh file and the `NAME.toml` beside it, brought into the object's frame.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 use prehend_geometry::{
-    MeshFormat, MeshReport, OrientedBox, Repairs, Shape, TriMesh, inspect, read_shape, repair,
+    FileShape, MeshFormat, MeshReport, OrientedBox, Repairs, Shape, Stated, TriMesh, inspect,
+    read_shape_with, repair,
 };
 use prehend_quality::Material;
 use prehend_tutor::{Opening, Parts};
@@ -16,9 +17,10 @@ mod annotation;
 mod guess;
 
 pub use annotation::{Annotation, PartBox, Rim};
+pub use guess::{is_in_millimetres, looks_like_millimetres};
 
 /// Extensions of the meshes that an objects folder may hold.
-pub const MESH_EXTENSIONS: [&str; 4] = ["off", "obj", "stl", "ply"];
+pub const MESH_EXTENSIONS: [&str; 7] = ["off", "obj", "stl", "ply", "gltf", "glb", "dae"];
 
 /// An object in its own frame: metres, up is +z, front is +x, origin as in its file.
 #[derive(Debug, Clone)]
@@ -37,6 +39,8 @@ pub struct Object {
     pub repairs: Repairs,
     /// How the file's coordinates became the object's.
     pub placement: Placement,
+    /// Who said so.
+    pub origins: Origins,
     /// Mass (kg), where the file beside it says.
     pub mass: Option<f64>,
     /// Centre of mass, where the file beside it says.
@@ -60,7 +64,65 @@ pub struct Placement {
     pub front: [f64; 3],
 }
 
+/// Where scale, up and front come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origins {
+    /// Of the scale.
+    pub scale: Origin,
+    /// Of the upward direction.
+    pub up: Origin,
+    /// Of the direction to the front.
+    pub front: Origin,
+}
+
+/// Who says how a file's coordinates are to be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// The caller ([`ObjectOptions`], a flag).
+    Flag,
+    /// The `.toml` beside the mesh.
+    Toml,
+    /// The file itself, or its format.
+    File,
+    /// The shape; what led to the guess is among the notes.
+    Guessed,
+    /// Nobody: the file's own coordinates.
+    Assumed,
+}
+
 impl Placement {
+    /// The placement with these directions, made unit and perpendicular.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Input`](crate::Error) where a direction has no length or both are parallel.
+    pub fn new(scale: f64, up: [f64; 3], front: [f64; 3]) -> Result<Self, Error> {
+        let wrong = || {
+            Error::input(format!(
+                "up {up:?} and front {front:?}: expected two different directions"
+            ))
+        };
+        let unit = |v: [f64; 3]| {
+            let unit = Vector3::from(v).try_normalize(1e-9)?;
+            unit.iter().all(|c| c.is_finite()).then_some(unit)
+        };
+        let (z, x) = unit(up).zip(unit(front)).ok_or_else(wrong)?;
+        if z.cross(&x).norm() < 1e-3 {
+            return Err(wrong());
+        }
+        Ok(Self {
+            scale,
+            up: z.into(),
+            front: (x - z * z.dot(&x)).normalize().into(),
+        })
+    }
+
+    /// A point of the file in the object's frame.
+    pub fn point(&self, p: &Point3<f64>) -> Point3<f64> {
+        self.apply(p.coords.into())
+    }
+
     fn object_from_file(&self) -> Rotation3<f64> {
         let z = Vector3::from(self.up);
         let x = Vector3::from(self.front);
@@ -81,6 +143,12 @@ impl Placement {
 pub struct ObjectOptions {
     /// Ignore the file beside the mesh and guess nothing: coordinates are metres in the object's frame.
     pub as_is: bool,
+    /// Metres per unit; overrides what file and annotation say.
+    pub scale: Option<f64>,
+    /// The file's direction that becomes +z; overrides what file and annotation say.
+    pub up: Option<[f64; 3]>,
+    /// The file's direction that becomes +x; overrides what the annotation says.
+    pub front: Option<[f64; 3]>,
 }
 
 impl Object {
@@ -95,10 +163,12 @@ impl Object {
         let format = MeshFormat::from_extension(&extension).ok_or_else(|| {
             Error::file(
                 path,
-                format!("the extension `{extension}` is no mesh; use .off, .obj, .stl or .ply"),
+                format!(
+                    "the extension `{extension}` is no mesh; use .off, .obj, .stl, .ply, .gltf, .glb or .dae"
+                ),
             )
         })?;
-        let shape = read_shape(&files::read(path)?, format).map_err(|e| Error::file(path, e))?;
+        let FileShape { shape, stated } = read_with_files_beside(path, format)?;
         let Shape::Mesh(raw) = shape else {
             return Err(Error::file(
                 path,
@@ -111,12 +181,13 @@ impl Object {
         } else {
             Annotation::default()
         };
-        Self::assemble(path, raw, &annotation, options).map_err(|e| Error::file(path, e))
+        Self::assemble(path, raw, stated, &annotation, options).map_err(|e| Error::file(path, e))
     }
 
     fn assemble(
         path: &Path,
         raw: TriMesh,
+        stated: Stated,
         annotation: &Annotation,
         options: ObjectOptions,
     ) -> Result<Self, Error> {
@@ -131,15 +202,7 @@ impl Object {
             }
             _ => "unknown".to_owned(),
         };
-        let placement = if options.as_is {
-            Placement {
-                scale: 1.0,
-                up: [0.0, 0.0, 1.0],
-                front: [1.0, 0.0, 0.0],
-            }
-        } else {
-            guess::placement(&mesh, annotation, &kind, &mut notes)
-        };
+        let (placement, origins) = guess::placement(&mesh, &options, annotation, stated, &kind, &mut notes)?;
         let mesh = TriMesh::new(
             mesh.vertices()
                 .iter()
@@ -177,6 +240,7 @@ impl Object {
             report,
             repairs,
             placement,
+            origins,
             mass: annotation.mass,
             center_of_mass: annotation.center_of_mass.map(|p| placement.apply(p)),
             material,
@@ -236,6 +300,26 @@ impl Object {
     }
 }
 
+/// A shape, read with the further files that it names: those beside it.
+///
+/// # Errors
+///
+/// [`Error::File`] with the place in the file that is wrong.
+pub fn read_with_files_beside(path: &Path, format: MeshFormat) -> Result<FileShape, Error> {
+    let beside = |name: &str| {
+        let further = Path::new(name);
+        let inside = further
+            .components()
+            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        if !inside {
+            return Err("does not stand beside the mesh".to_owned());
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        files::read(&folder.join(further)).map_err(|e| format!("cannot be had: {e}"))
+    };
+    read_shape_with(&files::read(path)?, format, &beside).map_err(|e| Error::file(path, e))
+}
+
 /// What a folder of meshes gave.
 #[derive(Debug)]
 pub struct ObjectFolder {
@@ -289,8 +373,11 @@ fn describe(report: &MeshReport, repairs: &Repairs) -> Vec<String> {
     }
     if !report.watertight {
         notes.push(format!(
-            "not closed: {} boundary and {} non-manifold edges, {} holes left as they are; inside and outside are told by the winding number",
-            report.boundary_edges, report.non_manifold_edges, report.n_holes
+            "not closed: {} boundary and {} non-manifold edges, {} holes of {:.3e} m² in all left as they are; inside and outside are told by the winding number",
+            report.boundary_edges,
+            report.non_manifold_edges,
+            report.n_holes,
+            report.holes.iter().map(|hole| hole.area).sum::<f64>()
         ));
     }
     notes

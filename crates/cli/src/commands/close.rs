@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use prehend::ObjectOptions;
 use prehend::grasp::{CloseOptions, GraspObject, close};
 use prehend::grasp_table::ContactRecord;
 use prehend::hand::Hand;
@@ -15,6 +14,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::hand::pose_json;
+use super::shape_input::PlacementOptions;
 use crate::output::{self, Outcome};
 
 /// Close a user's own grasp candidates
@@ -39,9 +39,8 @@ pub struct Arguments {
     #[arg(long, allow_negative_numbers = true)]
     support_plane: Option<f64>,
 
-    /// Ignore the .toml beside the mesh
-    #[arg(long)]
-    as_is: bool,
+    #[command(flatten)]
+    placement: PlacementOptions,
 }
 
 #[derive(Deserialize)]
@@ -64,7 +63,7 @@ struct Pose {
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
         let hand = HandData::read(&self.hand)?.hand;
-        let shape = shape_of(&self.object, ObjectOptions { as_is: self.as_is })?;
+        let shape = shape_of(&self.object, self.placement.object_options())?;
         let object = shape.grasp_object()?;
         let run = |line: Value| closed(&hand, &object, line, self.support_plane);
         output::each_json_line(json, &self.file, run, output::plain)

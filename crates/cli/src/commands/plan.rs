@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use prehend::ObjectOptions;
 use prehend::grasp::SynthesisOptions;
 use prehend::grasp_table::ContactRecord;
 use prehend::hand::Hand;
@@ -14,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::hand::pose_json;
 use super::model::read_model;
+use super::shape_input::PlacementOptions;
 use crate::bars::Bars;
 use crate::output::{self, Outcome};
 
@@ -55,16 +55,15 @@ pub struct Arguments {
     #[arg(long, allow_negative_numbers = true)]
     support_plane: Option<f64>,
 
-    /// Ignore the .toml beside the mesh
-    #[arg(long)]
-    as_is: bool,
+    #[command(flatten)]
+    placement: PlacementOptions,
 }
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
         let model = read_model(&self.model)?;
         let hand = HandData::read(&self.hand)?;
-        let shape = shape_of(&self.object, ObjectOptions { as_is: self.as_is })?;
+        let shape = shape_of(&self.object, self.placement.object_options())?;
         let options = SynthesisOptions {
             tries: self.tries,
             seed: self.seed,
@@ -84,6 +83,9 @@ impl Arguments {
             "scale": shape.object.placement.scale,
             "up": shape.object.placement.up,
             "front": shape.object.placement.front,
+            "scale_from": shape.object.origins.scale,
+            "up_from": shape.object.origins.up,
+            "front_from": shape.object.origins.front,
             "notes": shape.object.notes,
         });
         if let Some(reason) = result.reason {

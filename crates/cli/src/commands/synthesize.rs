@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use prehend::ObjectOptions;
 use prehend::frame::Frame;
 use prehend::grasp::SynthesisOptions;
 use prehend::run_record::timed;
@@ -11,6 +10,7 @@ use prehend::stages::decompose::shape_of;
 use prehend::stages::synthesize::{HandData, grasp};
 use serde_json::{Value, json};
 
+use super::shape_input::PlacementOptions;
 use crate::bars::Bars;
 use crate::output::{self, Outcome};
 
@@ -44,9 +44,8 @@ pub struct Arguments {
     #[arg(long, allow_negative_numbers = true)]
     support_plane: Option<f64>,
 
-    /// Ignore the .toml beside the mesh
-    #[arg(long)]
-    as_is: bool,
+    #[command(flatten)]
+    placement: PlacementOptions,
 }
 
 impl Arguments {
@@ -55,7 +54,7 @@ impl Arguments {
             Frame::check_name(out)?;
         }
         let hand = HandData::read(&self.hand)?;
-        let shape = shape_of(&self.object, ObjectOptions { as_is: self.as_is })?;
+        let shape = shape_of(&self.object, self.placement.object_options())?;
         let options = SynthesisOptions {
             tries: self.tries,
             seed: self.seed,
@@ -80,6 +79,9 @@ impl Arguments {
             "scale": shape.object.placement.scale,
             "up": shape.object.placement.up,
             "front": shape.object.placement.front,
+            "scale_from": shape.object.origins.scale,
+            "up_from": shape.object.origins.up,
+            "front_from": shape.object.origins.front,
             "notes": shape.object.notes,
         });
         output::answer(json, &answer, text)?;

@@ -1,10 +1,13 @@
 //! What a mesh's annotation leaves out, guessed from its shape; each guess is noted in words.
 
+use std::path::Path;
+
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
-use prehend_geometry::{OrientedBox, TriMesh};
+use prehend_geometry::{OrientedBox, Stated, TriMesh};
 use prehend_tutor::Opening;
 
-use super::{Annotation, Object, Placement};
+use super::{Annotation, Object, ObjectOptions, Origin, Origins, Placement};
+use crate::Error;
 
 /// Types that the tutor has rules for, with a typical largest extent (m) for files without a real size.
 const TYPICAL_EXTENTS: [(&str, f64); 6] = [
@@ -32,48 +35,83 @@ const RIM_SHARE: f64 = 0.02;
 /// A rim of a smaller radius (m) is a tip: nothing can be poured through it.
 const LEAST_OPENING: f64 = 0.001;
 
-/// Scale, up and front from the annotation, else guessed.
+/// Scale, up and front from the caller, else the annotation, else the file, else guessed.
 pub(super) fn placement(
     mesh: &TriMesh,
+    options: &ObjectOptions,
     annotation: &Annotation,
+    stated: Stated,
     kind: &str,
     notes: &mut Vec<String>,
-) -> Placement {
-    let scale = annotation
-        .metres_per_unit
-        .unwrap_or_else(|| scale(mesh, kind, notes));
-    let up = annotation.up.map_or_else(
-        || {
-            notes.push("assumed: up is the file's +z".to_owned());
-            Vector3::z()
-        },
-        |v| Vector3::from(v).normalize(),
-    );
-    let front = match annotation.front {
-        Some(front) => Vector3::from(front),
-        None => front(mesh, &up, notes),
+) -> Result<(Placement, Origins), Error> {
+    let stated = if options.as_is { Stated::default() } else { stated };
+    let said = |flag: Option<[f64; 3]>, toml: Option<[f64; 3]>, file: Option<[f64; 3]>| {
+        flag.map(|v| (v, Origin::Flag))
+            .or(toml.map(|v| (v, Origin::Toml)))
+            .or(file.map(|v| (v, Origin::File)))
     };
-    let front = (front - up * up.dot(&front)).normalize();
-    Placement {
-        scale,
-        up: up.into(),
-        front: front.into(),
+    let (scale, scale_origin) = options
+        .scale
+        .map(|s| (s, Origin::Flag))
+        .or(annotation.metres_per_unit.map(|s| (s, Origin::Toml)))
+        .or(stated.metres_per_unit.map(|s| (s, Origin::File)))
+        .unwrap_or_else(|| {
+            if options.as_is {
+                (1.0, Origin::Assumed)
+            } else {
+                scale(mesh, kind, notes)
+            }
+        });
+    let (up, up_origin) = said(
+        options.up,
+        annotation.up,
+        stated.up.map(|v| v.into_inner().into()),
+    )
+    .unwrap_or_else(|| {
+        if !options.as_is {
+            notes.push("assumed: up is the file's +z".to_owned());
+        }
+        ([0.0, 0.0, 1.0], Origin::Assumed)
+    });
+    // The caller's own directions have not been checked yet; one without length is refused below.
+    let upward = Vector3::from(up).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+    let (front, front_origin) = said(options.front, annotation.front, None).unwrap_or_else(|| {
+        if options.as_is {
+            (any_front(&upward), Origin::Assumed)
+        } else {
+            front(mesh, &upward, notes)
+        }
+    });
+    let origins = Origins {
+        scale: scale_origin,
+        up: up_origin,
+        front: front_origin,
+    };
+    Ok((Placement::new(scale, up, front)?, origins))
+}
+
+/// The file's +x as front, or +y where +x is up.
+pub(super) fn any_front(up: &Vector3<f64>) -> [f64; 3] {
+    if up.x.abs() < 0.9 {
+        [1.0, 0.0, 0.0]
+    } else {
+        [0.0, 1.0, 0.0]
     }
 }
 
-fn scale(mesh: &TriMesh, kind: &str, notes: &mut Vec<String>) -> f64 {
+fn scale(mesh: &TriMesh, kind: &str, notes: &mut Vec<String>) -> (f64, Origin) {
     let (low, high) = mesh.axis_aligned_bounds();
     let largest = (high - low).max();
     if largest > 20.0 {
         notes.push(format!(
             "guessed: millimetres, since the largest extent is {largest:.4} units"
         ));
-        0.001
+        (0.001, Origin::Guessed)
     } else if (0.02..0.6).contains(&largest) {
         notes.push(format!(
             "assumed: metres, since the largest extent is {largest:.4} units"
         ));
-        1.0
+        (1.0, Origin::Assumed)
     } else {
         let typical = TYPICAL_EXTENTS
             .iter()
@@ -82,12 +120,31 @@ fn scale(mesh: &TriMesh, kind: &str, notes: &mut Vec<String>) -> f64 {
         notes.push(format!(
             "guessed: the largest extent of {largest:.4} units is no hand-sized length in metres or millimetres; set to {typical} m"
         ));
-        typical / largest
+        (typical / largest, Origin::Guessed)
     }
 }
 
+/// Whether a shape without annotation may be taken for millimetres: a mug, bottle, … of 30 to 600 units.
+pub fn is_in_millimetres(points: &[Point3<f64>], path: &Path) -> bool {
+    let lower = path.to_string_lossy().to_ascii_lowercase();
+    KNOWN_KINDS.iter().any(|kind| lower.contains(kind)) && looks_like_millimetres(points)
+}
+
+/// Whether the largest extent is that of a thing for a hand, in millimetres.
+pub fn looks_like_millimetres(points: &[Point3<f64>]) -> bool {
+    let extent = |k: usize| {
+        let (low, high) = points
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
+                (l.min(p[k]), h.max(p[k]))
+            });
+        high - low
+    };
+    (30.0..=600.0).contains(&(0..3).map(extent).fold(0.0, f64::max))
+}
+
 /// Direction of the part farthest off the up axis, or any perpendicular one for a body of revolution.
-fn front(mesh: &TriMesh, up: &Vector3<f64>, notes: &mut Vec<String>) -> Vector3<f64> {
+fn front(mesh: &TriMesh, up: &Vector3<f64>, notes: &mut Vec<String>) -> ([f64; 3], Origin) {
     const SECTORS: usize = 72;
     let z_from_up = Rotation3::rotation_between(up, &Vector3::z())
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
@@ -129,10 +186,10 @@ fn front(mesh: &TriMesh, up: &Vector3<f64>, notes: &mut Vec<String>) -> Vector3<
             "guessed: front is {}, where the shape reaches farthest from its axis",
             axis_words(&direction)
         ));
-        direction
+        (direction.into(), Origin::Guessed)
     } else {
         notes.push("assumed: no front, since the shape is nearly round about its axis".to_owned());
-        z_from_up.inverse() * Vector3::x()
+        ((z_from_up.inverse() * Vector3::x()).into(), Origin::Assumed)
     }
 }
 
@@ -261,8 +318,6 @@ fn mug_handle(object: &mut Object, boxes: &[OrientedBox]) {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::ObjectOptions;
 
@@ -310,6 +365,7 @@ mod tests {
         Object::assemble(
             Path::new("thing.ply"),
             mesh,
+            Stated::default(),
             &annotation,
             ObjectOptions::default(),
         )
