@@ -64,6 +64,39 @@ fn the_toml_beside_a_mesh_counts_unless_it_is_left_out() {
 }
 
 #[test]
+fn a_mug_of_two_hundred_units_is_in_millimetres_unless_a_flag_says_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let corner = |(k, line): (usize, &str)| match k {
+        2..10 => line.replace('2', "200"),
+        _ => line.to_owned(),
+    };
+    let large: Vec<String> = CUBE.lines().enumerate().map(corner).collect();
+    let large = large.join("\n");
+    let mug = put(folder.path(), "mug.off", &large);
+    let guessed = prehend(&["mesh", &mug, "--json"], "").answer();
+    assert_eq!(guessed["scale_from"], json!("guessed"));
+    assert_close(&guessed["volume"], 8e-3);
+    let told = prehend(&["mesh", "--units", "cm", &mug, "--json"], "").answer();
+    assert_eq!(told["scale_from"], json!("flag"));
+    assert_close(&told["volume"], 8.0);
+    let as_is = prehend(&["mesh", "--as-is", &mug, "--json"], "").answer();
+    assert_eq!(as_is["scale_from"], json!("assumed"));
+    assert_close(&as_is["volume"], 8e6);
+}
+
+#[test]
+fn up_and_front_by_flag_turn_a_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let cube = put(folder.path(), "cube.off", CUBE);
+    let answer = prehend(&["mesh", "--up", "y", "--front", "-x", &cube, "--json"], "").answer();
+    assert_eq!(answer["up_from"], json!("flag"));
+    assert_eq!(answer["front_from"], json!("flag"));
+    for (k, middle) in [-1.0, 1.0, 1.0].into_iter().enumerate() {
+        assert_close(&answer["bounding_box"]["center"][k], middle);
+    }
+}
+
+#[test]
 fn a_cloud_has_a_hull_but_no_volume() {
     let folder = tempfile::tempdir().unwrap();
     let points = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";

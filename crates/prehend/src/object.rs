@@ -377,7 +377,7 @@ fn describe(report: &MeshReport, repairs: &Repairs) -> Vec<String> {
             report.boundary_edges,
             report.non_manifold_edges,
             report.n_holes,
-            report.holes.iter().map(|hole| hole.area).sum::<f64>()
+            report.holes.iter().fold(0.0, |sum, hole| sum + hole.area)
         ));
     }
     notes

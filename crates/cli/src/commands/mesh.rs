@@ -66,7 +66,7 @@ fn facts(file: &Path, options: &ShapeOptions) -> Result<Value> {
         "boundary_edges": report.as_ref().map_or(0, |r| r.boundary_edges),
         "non_manifold_edges": report.as_ref().map_or(0, |r| r.non_manifold_edges),
         "holes": report.as_ref().map_or(&[][..], |r| &r.holes),
-        "repairs": mended.as_ref().map(|(_, repairs)| repairs),
+        "repairs": input.repairs.as_ref().or(mended.as_ref().map(|(_, repairs)| repairs)),
         "hull_volume": hull_volume,
         "bounding_box": {
             "center": bounding_box.center.coords.as_slice(),

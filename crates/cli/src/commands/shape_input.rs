@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use nalgebra::Point3;
-use prehend::geometry::{FileShape, MeshFormat, Shape, Stated, TriMesh};
+use prehend::geometry::{FileShape, MeshFormat, Repairs, Shape, Stated, TriMesh};
 use prehend::object::{
     Origin, Origins, Placement, is_in_millimetres, looks_like_millimetres, read_with_files_beside,
 };
@@ -121,6 +121,8 @@ pub struct Input {
     pub n_triangles: usize,
     /// `scale`, `up`, `front`, who said so (`scale_from`, …: flag, toml, file, guessed or assumed) and `notes`.
     pub placement: Value,
+    /// What was mended on reading; `None` where the shape is as in the file.
+    pub repairs: Option<Repairs>,
 }
 
 /// Reads a shape. Flags, the `.toml` beside a mesh and the file itself give scale, up and front, in this order; without a
@@ -140,17 +142,22 @@ pub fn read(path: &Path, options: &ShapeOptions) -> Result<Input> {
             n_vertices,
             n_triangles,
             placement,
+            repairs: None,
         }
     };
     let flags = options.placement.object_options();
     if matches!(shape, Shape::Mesh(_)) && !flags.as_is && path.with_extension("toml").is_file() {
         let object = Object::read(path, flags)?;
-        return Ok(placed(
+        let input = placed(
             Shape::Mesh(object.mesh),
             &object.placement,
             &object.origins,
             &object.notes,
-        ));
+        );
+        return Ok(Input {
+            repairs: Some(object.repairs),
+            ..input
+        });
     }
     let stated = if flags.as_is { Stated::default() } else { stated };
     let mut notes = Vec::new();
