@@ -15,6 +15,7 @@ mod label;
 mod learn_structure;
 mod mesh;
 mod model;
+mod partial_view;
 mod pipeline;
 mod plan;
 mod quality;
@@ -57,6 +58,8 @@ pub enum Command {
     Imitate(imitate::Arguments),
     /// List, filter and convert grasps
     Grasps(grasps::Arguments),
+    /// Size and cvex, with their uncertainty, of an object seen from one side only
+    PartialView(partial_view::Arguments),
     /// Convert models
     Model(model::Arguments),
 }
@@ -80,6 +83,7 @@ impl Command {
             Self::Query(a) => a.run(json),
             Self::Imitate(a) => a.run(json),
             Self::Grasps(a) => a.run(json),
+            Self::PartialView(a) => a.run(json),
             Self::Model(a) => a.run(json),
         }
     }

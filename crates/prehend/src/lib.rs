@@ -11,6 +11,7 @@ pub mod grasp_table;
 pub mod hand_folder;
 pub mod labels;
 pub mod object;
+pub mod partial_view;
 pub mod pipeline;
 pub mod plan;
 pub mod progress;
