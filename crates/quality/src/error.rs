@@ -139,6 +139,19 @@ pub enum QualityError {
         facets: usize,
     },
 
+    /// A standard deviation of [`crate::Uncertainty`] is none.
+    #[error("uncertainty: `{name}` is {value}; expected a finite standard deviation of at least 0")]
+    BadUncertainty {
+        /// The field.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+    },
+
+    /// A distribution was asked for without samples.
+    #[error("0 samples say nothing; ask for at least 1")]
+    NoSamples,
+
     /// A name is not one of the materials.
     #[error("`{found}` is not a material; expected glass, metal, plastic, wood, rubber or stone")]
     UnknownMaterial {

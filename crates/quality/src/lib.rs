@@ -10,6 +10,8 @@
 //! ```
 //!
 //! [`grasp_quality`] answers everything at once; [`EpsilonSolver`] answers only ε, thousands of times a second.
+//! [`TaskWrenches`] puts a task's own disturbances in the place of the ball, [`epsilon_sensitivity`] says which contact to
+//! move, and [`epsilon_distribution`] what remains of ε when contacts, pose and friction are not known exactly.
 //! This crate knows points and normals. It never knows about hands.
 //!
 //! # Examples
@@ -55,7 +57,9 @@ mod min_norm;
 mod volume;
 
 mod quality;
+mod sensitivity;
 mod task;
+mod uncertainty;
 
 pub use contact::Contact;
 pub use coordinates::{WrenchAxes, WrenchMetric};
@@ -66,6 +70,8 @@ pub use material::{Material, friction_coefficient};
 pub use min_norm::origin_distance;
 pub use options::{ConeShape, LengthUnit, LimitSurface, Norm, QualityOptions};
 pub use quality::{Quality, grasp_quality, grasp_quality_with, wrench_rank};
+pub use sensitivity::{ContactSensitivity, epsilon_sensitivity};
 pub use soft_contact::{DEGENERATE_RADIUS, soft_torsion, soft_torsion_default};
 pub use task::{TaskScale, TaskWrenches};
+pub use uncertainty::{EpsilonDistribution, QUANTILES, Uncertainty, epsilon_distribution};
 pub use wrench_space::GraspWrenchSpace;
