@@ -224,9 +224,8 @@ impl PartialViewModel {
         let spread_of = spread_features(cloud);
         let log_mean: [f64; N_TARGETS] =
             std::array::from_fn(|k| seen.naive[k].ln() + self.targets[k].mean.predict(&seen.features));
-        let unit: [f64; N_TARGETS] = std::array::from_fn(|k| {
-            self.targets[k].spread.predict(&spread_of).exp().max(LEAST_SPREAD)
-        });
+        let unit: [f64; N_TARGETS] =
+            std::array::from_fn(|k| self.targets[k].spread.predict(&spread_of).exp().max(LEAST_SPREAD));
         let log_covariance = Matrix4::from_fn(|i, j| {
             self.correlation[i][j] * unit[i] * self.targets[i].scale * unit[j] * self.targets[j].scale
         });
@@ -240,7 +239,9 @@ impl PartialViewModel {
         Ok(Estimate {
             size: Uncertain {
                 mean: mean[..3].to_vec(),
-                covariance: (0..3).map(|i| (0..3).map(|j| covariance(i, j)).collect()).collect(),
+                covariance: (0..3)
+                    .map(|i| (0..3).map(|j| covariance(i, j)).collect())
+                    .collect(),
             },
             cvex: Uncertain {
                 mean: vec![mean[3]],

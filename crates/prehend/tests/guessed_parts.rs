@@ -21,7 +21,10 @@ fn labels(path: &Path) -> BTreeMap<String, Vec<usize>> {
     let mut parts = BTreeMap::new();
     let mut lines = text.lines().filter(|l| !l.trim().is_empty());
     while let (Some(name), Some(faces)) = (lines.next(), lines.next()) {
-        let faces = faces.split_whitespace().map(|n| n.parse::<usize>().unwrap() - 1).collect();
+        let faces = faces
+            .split_whitespace()
+            .map(|n| n.parse::<usize>().unwrap() - 1)
+            .collect();
         parts.insert(name.trim().to_owned(), faces);
     }
     parts
@@ -54,7 +57,10 @@ fn the_guessed_handle_of_a_scanned_mug_is_the_one_that_people_labelled() {
     let mug = shape_of(&data.join("objects/mug/lpsb_27.off"), ObjectOptions::default()).unwrap();
     let told = labels(&data.join("labels/lpsb_27_labels.txt"));
     let overlap = handle_overlap(&mug, &told["handle"]);
-    eprintln!("handle of lpsb_27: intersection over union {overlap:.3}; {:?}", mug.object.notes);
+    eprintln!(
+        "handle of lpsb_27: intersection over union {overlap:.3}; {:?}",
+        mug.object.notes
+    );
     assert!(overlap > 0.8, "{overlap}");
 }
 

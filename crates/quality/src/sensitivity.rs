@@ -147,8 +147,8 @@ fn with_normal(contact: Contact, turn: UnitQuaternion<f64>) -> Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::epsilon;
     use crate::GraspWrenchSpace;
+    use crate::epsilon;
 
     /// Five contacts in general position on an ellipsoid.
     fn grasp() -> Vec<Contact> {
@@ -187,10 +187,14 @@ mod tests {
             moved[i] = with_normal(with_point(moved[i], moved[i].at.point + shift), turned);
             moved[i].mu += 1e-4;
             let foretold = s.point.dot(&shift)
-                + s.normal.dot(&(moved[i].at.normal.into_inner() - contacts[i].at.normal.into_inner()))
+                + s.normal
+                    .dot(&(moved[i].at.normal.into_inner() - contacts[i].at.normal.into_inner()))
                 + s.mu * 1e-4;
             let found = value(&moved) - here;
-            assert!((found - foretold).abs() < 2e-7 + 1e-3 * foretold.abs(), "{found} {foretold}");
+            assert!(
+                (found - foretold).abs() < 2e-7 + 1e-3 * foretold.abs(),
+                "{found} {foretold}"
+            );
         }
     }
 

@@ -134,12 +134,7 @@ enum Task {
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
         let mut solver = EpsilonSolver::default();
-        output::each_json_line(
-            json,
-            &self.file,
-            |v| self.quality(v, &mut solver),
-            output::plain,
-        )
+        output::each_json_line(json, &self.file, |v| self.quality(v, &mut solver), output::plain)
     }
 
     fn quality(&self, value: Value, solver: &mut EpsilonSolver) -> Result<Value> {
@@ -200,21 +195,21 @@ fn has_ellipsoid(options: &QualityOptions, contacts: &[Contact]) -> bool {
 
 impl Line {
     fn contacts(&self) -> Result<Vec<Contact>> {
-        let contact = |(i, c): (usize, &ContactLine)| match UnitVector3::try_new(Vector3::from(c.normal), 1e-9)
-        {
-            Some(normal) if normal.iter().all(|x| x.is_finite()) => Ok(Contact {
-                at: ContactPoint {
-                    point: Point3::from(c.point),
-                    normal,
-                },
-                mu: c.mu,
-                torsion: c.torsion,
-            }),
-            _ => bail!(
-                "contact {i}: the normal {:?} has no direction; give a unit vector into the object",
-                c.normal
-            ),
-        };
+        let contact =
+            |(i, c): (usize, &ContactLine)| match UnitVector3::try_new(Vector3::from(c.normal), 1e-9) {
+                Some(normal) if normal.iter().all(|x| x.is_finite()) => Ok(Contact {
+                    at: ContactPoint {
+                        point: Point3::from(c.point),
+                        normal,
+                    },
+                    mu: c.mu,
+                    torsion: c.torsion,
+                }),
+                _ => bail!(
+                    "contact {i}: the normal {:?} has no direction; give a unit vector into the object",
+                    c.normal
+                ),
+            };
         self.contacts.iter().enumerate().map(contact).collect()
     }
 
@@ -236,7 +231,10 @@ impl Line {
                 WrenchAxes::new(counts)?
             }
         };
-        let metric = self.metric_semi_axes.map(WrenchMetric::from_semi_axes).transpose()?;
+        let metric = self
+            .metric_semi_axes
+            .map(WrenchMetric::from_semi_axes)
+            .transpose()?;
         Ok(QualityOptions {
             cone,
             limit_surface: match self.limit_surface {

@@ -25,10 +25,7 @@ pub(super) fn cloud_features(cloud: &PartialCloud) -> Option<Seen> {
         return None;
     }
     let (low, high) = cloud.points.iter().fold(
-        (
-            Vector3::repeat(f64::INFINITY),
-            Vector3::repeat(f64::NEG_INFINITY),
-        ),
+        (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)),
         |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)),
     );
     let straight = (high - low).map(|e| e.max(LEAST_EXTENT).ln());

@@ -53,7 +53,13 @@ impl Ridge {
             Some(factor) => {
                 let standardised = factor.solve(&(x.transpose() * b));
                 (0..dim)
-                    .map(|k| if sd[k] > 1e-12 { standardised[k] / sd[k] } else { 0.0 })
+                    .map(|k| {
+                        if sd[k] > 1e-12 {
+                            standardised[k] / sd[k]
+                        } else {
+                            0.0
+                        }
+                    })
                     .collect()
             }
             None => vec![0.0; dim],
@@ -74,7 +80,11 @@ impl Ridge {
         let fit = |w: &[f64]| Self::fit(rows.iter().cloned(), y.iter().copied(), w);
         let mut line = fit(weights);
         for _ in 0..ROUNDS {
-            let errors: Vec<f64> = rows.iter().zip(&y).map(|(x, y)| (y - line.predict(x)).abs()).collect();
+            let errors: Vec<f64> = rows
+                .iter()
+                .zip(&y)
+                .map(|(x, y)| (y - line.predict(x)).abs())
+                .collect();
             let mut sorted = errors.clone();
             sorted.sort_by(f64::total_cmp);
             // 1.4826 times the median of |e| is the standard deviation of a normal e.
