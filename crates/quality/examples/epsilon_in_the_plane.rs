@@ -66,7 +66,7 @@ fn main() -> Result<(), prehend_quality::QualityError> {
         -x, -y
     );
     println!(
-        r##"<text x="-60" y="122" fill="#06c">solid: the push resisted least; dashed: the force that answers it</text></svg>"##
+        r##"<text x="-300" y="122" fill="#06c">solid: the push resisted least; dashed: the force that answers it</text></svg>"##
     );
     Ok(())
 }
