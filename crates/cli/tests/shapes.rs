@@ -196,7 +196,7 @@ fn a_corner_tetrahedron_leaves_five_sixths_of_a_unit_cube() {
          {{\"tetrahedron\":[[0,0,0],[1,0,0],[0,1,0],[0,0,1]],\"boxes\":{doubled}}}\n\
          {{\"boxes\":[]}}\n"
     );
-    let run = prehend(&["free-volume", "-", "--json"], &input);
+    let run = prehend(&["free-volume", "-", "--hull", "--json"], &input);
     assert_eq!(run.status, 1, "the last line fails");
     let lines = run.lines();
     for answer in &lines[..2] {

@@ -20,6 +20,10 @@ use crate::output::{self, Outcome};
 pub struct Arguments {
     /// JSON lines: tetrahedron (or palm and contacts) and boxes; - is standard input
     file: PathBuf,
+
+    /// Also `fvol_hull`, of the hull of palm and all contacts, where these are given (slow)
+    #[arg(long)]
+    hull: bool,
 }
 
 #[derive(Deserialize)]
@@ -33,11 +37,11 @@ struct Line {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        output::each_json_line(json, &self.file, free_volume, output::plain)
+        output::each_json_line(json, &self.file, |v| free_volume(v, self.hull), output::plain)
     }
 }
 
-fn free_volume(value: Value) -> Result<Value> {
+fn free_volume(value: Value, hull: bool) -> Result<Value> {
     let line: Line =
         serde_json::from_value(value).context("expected tetrahedron or palm and contacts, and boxes")?;
     if line.boxes.is_empty() {
@@ -48,8 +52,8 @@ fn free_volume(value: Value) -> Result<Value> {
         (None, Some(palm), Some(contacts)) => {
             let palm = Point3::from(palm);
             let contacts: Vec<Point3<f64>> = contacts.into_iter().map(Point3::from).collect();
-            let of_hull = free_volume_of_hull(&palm, &contacts, &line.boxes);
-            (largest_tetrahedron(palm, &contacts), Some(of_hull.fvol))
+            let of_hull = hull.then(|| free_volume_of_hull(&palm, &contacts, &line.boxes).fvol);
+            (largest_tetrahedron(palm, &contacts), of_hull)
         }
         _ => bail!("expected either `tetrahedron`, or `palm` and `contacts`"),
     };

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use nalgebra::Point3;
 use prehend::geometry::Shape;
+use prehend::object::Placement;
 use prehend::partial_view::{PartialCloud, PartialViewModel, Scanner, coverage, scan_all};
 use prehend::{Object, ObjectOptions};
 use serde_json::{Value, json};
@@ -26,7 +27,7 @@ enum Action {
         after_help = "Example:\n  prehend partial-view learn --objects objects --out views.json --coverage"
     )]
     Learn(Learn),
-    /// What clouds of unknown objects say, as evidence for `prehend query`
+    /// What clouds of unknown objects say, as evidence for `prehend query`; --up and --front say how they are turned
     #[command(
         after_help = "Example:\n  prehend partial-view estimate views.json cloud.pcd --viewpoint 0.5,0,0.3 --json"
     )]
@@ -72,14 +73,6 @@ struct Estimate {
     /// Where the camera stood, in the file's own axes and unit
     #[arg(long, value_parser = triple, default_value = "0,0,0", allow_hyphen_values = true)]
     viewpoint: [f64; 3],
-
-    /// The file's direction that is up
-    #[arg(long = "cloud-up", value_parser = triple, default_value = "0,0,1", allow_hyphen_values = true)]
-    up: [f64; 3],
-
-    /// The file's direction that is the object's front (a mug's handle, a knife's edge)
-    #[arg(long = "cloud-front", value_parser = triple, default_value = "1,0,0", allow_hyphen_values = true)]
-    front: [f64; 3],
 
     #[command(flatten)]
     shape: ShapeOptions,
@@ -173,9 +166,8 @@ impl Estimate {
     fn run(self, json: bool) -> Result<Outcome> {
         let shown = output::shown(&self.model);
         let model = PartialViewModel::from_json(&prehend::files::read_text(&self.model)?).context(shown)?;
-        let turn = object_from_file(self.up, self.front)?;
         let run = |file: PathBuf| {
-            let cloud = self.cloud(&file, &turn)?;
+            let cloud = self.cloud(&file)?;
             let estimate = model.estimate(&cloud).with_context(|| output::shown(&file))?;
             Ok(json!({
                 "points": cloud.points.len(),
@@ -192,27 +184,17 @@ impl Estimate {
         })
     }
 
-    fn cloud(&self, file: &Path, turn: &Rotation3<f64>) -> Result<PartialCloud> {
+    fn cloud(&self, file: &Path) -> Result<PartialCloud> {
         let input = shape_input::read(file, &self.shape)?;
+        let placement: Placement =
+            serde_json::from_value(input.placement).context("the answer holds its own placement")?;
         let points = match input.shape {
             Shape::Cloud(points) => points,
             Shape::Mesh(mesh) => mesh.vertices().to_vec(),
         };
-        let scale = self.shape.scale.unwrap_or(1.0);
         Ok(PartialCloud {
-            points: points.iter().map(|p| turn * p).collect(),
-            viewpoint: turn * Point3::from(self.viewpoint) * scale,
+            points,
+            viewpoint: placement.point(&Point3::from(self.viewpoint)),
         })
     }
-}
-
-/// The rotation that takes up to +z and front to +x.
-fn object_from_file(up: [f64; 3], front: [f64; 3]) -> Result<Rotation3<f64>> {
-    let z = Vector3::from(up).try_normalize(1e-12);
-    let z = z.context("--cloud-up: found a vector of length 0, expected a direction")?;
-    let front = Vector3::from(front);
-    let x = (front - z * z.dot(&front)).try_normalize(1e-9);
-    let x = x.context("--cloud-front: found a direction along up, expected one across it")?;
-    let rows = [x.transpose(), z.cross(&x).transpose(), z.transpose()];
-    Ok(Rotation3::from_matrix_unchecked(Matrix3::from_rows(&rows)))
 }
