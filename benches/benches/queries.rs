@@ -56,7 +56,7 @@ fn batches(criterion: &mut Criterion) {
             }
             let rows = rows(&model, &query);
             criterion.bench_function(&format!("{pattern}/{name}"), |b| {
-                b.iter(|| query.run(black_box(&rows)))
+                b.iter(|| query.run(black_box(&rows)));
             });
         }
     }
