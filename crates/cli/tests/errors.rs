@@ -175,7 +175,7 @@ fn messages_name_the_thing_and_what_to_do() {
         ),
         (
             &["query", mug, "--target", "task"],
-            &["`.ply` is no model", ".bin or .json"],
+            &["`.ply` is no model", ".bin, .json"],
         ),
         (
             &[
@@ -218,10 +218,7 @@ fn messages_name_the_thing_and_what_to_do() {
         (&["label", &table], &["t.csv", "column `hand_path`"]),
         (&["grasps", "hands"], &["no tables found"]),
         (&["quality", "nowhere.jsonl"], &["nowhere.jsonl: is not there"]),
-        (
-            &["model", "convert", &model, "m.xyz"],
-            &["m.xyz", ".bin or .json"],
-        ),
+        (&["model", "convert", &model, "m.xyz"], &["m.xyz", ".bin, .json"]),
         (
             &["pipeline", "--objects", "nowhere", "--out", "nowhere-out"],
             &["nowhere: is not there"],

@@ -10,7 +10,7 @@ use crate::{OrientedBox, Tetrahedron};
 impl Tetrahedron {
     /// Volume (m³) of the part of the tetrahedron inside a box.
     ///
-    /// Bodies of ordinary shape take one pass over the tetrahedron's faces ([`clip`](crate::clip) tells how), in the
+    /// Bodies of ordinary shape take one pass over the tetrahedron's faces (the source of `clip` tells how), in the
     /// box's frame. Where an estimate says that rounding could cost more than some 1e-13 of the smaller body (needles,
     /// plates, bodies of very different size) each of the box's faces cuts every piece of the tetrahedron into at most
     /// three, in coordinates of the smaller body, from a point of its own. The error stays below 1e-12 of the smaller
