@@ -92,7 +92,7 @@ fn volumes(c: &mut Criterion) {
         });
     });
     c.bench_function("union_volume/boxes", |b| {
-        b.iter(|| union_volume(black_box(&grasps[0].boxes)))
+        b.iter(|| union_volume(black_box(&grasps[0].boxes)));
     });
     c.bench_function("largest_tetrahedron/grasps", |b| {
         let mut next = grasps.iter().cycle();
