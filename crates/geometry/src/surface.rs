@@ -127,7 +127,7 @@ impl Surface {
 
     /// A lower bound of the distance from `p` to the surface, from the grid.
     ///
-    /// Takes some tens of nanoseconds; the first query in a part of space near the surface some tens of microseconds.
+    /// The first query in a part of space near the surface also measures the grid there, which takes longer.
     pub fn distance_lower_bound(&self, p: &Point3<f64>) -> f64 {
         self.shared.grid.lower_bound(p)
     }
