@@ -1,6 +1,6 @@
 //! How many tries a second, and what becomes of them: every bundled hand on every bundled object.
 //!
-//! `cargo run --release -p prehend-grasp --example synthesis_speed [TRIES]`
+//! `cargo run --release -p prehend-grasp --example synthesis_speed [TRIES] [HAND] [OBJECT]`
 #![allow(clippy::disallowed_methods, reason = "an example that measures time")]
 
 use std::path::{Path, PathBuf};
@@ -11,7 +11,9 @@ use prehend_grasp::{GraspObject, SynthesisOptions, synthesize};
 use prehend_hand::Hand;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let argument = |n: usize| std::env::args().nth(n).unwrap_or_default();
     let tries = std::env::args().nth(1).map_or(Ok(600), |n| n.parse())?;
+    let wanted = |name: &str, n: usize| argument(n).is_empty() || argument(n) == name;
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for hand_folder in sorted(&top.join("hands"))? {
         let name = hand_folder
@@ -19,6 +21,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
+        if !wanted(&name, 2) {
+            continue;
+        }
         let urdf = std::fs::read_to_string(hand_folder.join(format!("{name}.urdf")))?;
         let hand = Hand::from_urdf(&urdf, &|file| Err(format!("{file} is not at hand")))?
             .with_description(&std::fs::read_to_string(hand_folder.join("hand.toml"))?)?;
@@ -26,7 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .iter()
             .flat_map(|f| sorted(f).unwrap_or_default())
         {
-            if file.extension().is_none_or(|e| e != "ply") {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+            if file.extension().is_none_or(|e| e != "ply") || !wanted(&stem, 3) {
                 continue;
             }
             let mesh = read_mesh(&std::fs::read(&file)?, MeshFormat::Ply)?;
@@ -55,7 +61,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 found.grasps.iter().map(|g| g.contacts.len()).sum::<usize>() as f64 / eps.len().max(1) as f64;
             println!(
                 "{name} {}: {n_triangles} triangles, ready in {ready:.2} s, {} hypotheses, {:.0} tries/s, kept {}/{}, eps {:.3} {:.3} {:.3}, {contacts:.1} contacts, {:?}",
-                file.file_stem().unwrap_or_default().display(),
+                stem,
                 found.n_hypotheses,
                 found.tried as f64 / seconds,
                 eps.len(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use prehend_geometry::Collider;
-use prehend_hand::{Description, Hand, JointKind, JointPositions, LinkIdx};
+use prehend_hand::{Description, Hand, JointIdx, JointKind, JointPositions, LinkIdx};
 use prehend_quality::{Material, friction_coefficient, soft_torsion_default};
 
 use crate::GraspError;
@@ -253,6 +253,18 @@ fn joint_nodes(hand: &Hand, description: &Description) -> Vec<JointNode> {
         .collect();
     for closing in &description.closing {
         nodes[closing.joint.0].speed = closing.speed;
+    }
+    // A coupling that lets go moves both joints alike until one is stopped: so do two free joints at those speeds.
+    for &JointIdx(idx) in &description.break_away {
+        let node = &nodes[idx];
+        let speed = node.multiplier * nodes[node.leader].speed;
+        nodes[idx] = JointNode {
+            leader: idx,
+            multiplier: 1.0,
+            offset: 0.0,
+            speed,
+            ..node.clone()
+        };
     }
     nodes
 }

@@ -51,6 +51,41 @@ impl Reason {
             Self::NotForceClosure => "not-force-closure",
         }
     }
+
+    /// What to look at where many tries end like this.
+    pub fn hint(self) -> &'static str {
+        match self {
+            Self::SelfCollision => {
+                "pre-shapes drive links of the hand through each other: narrow the eigengrasps' `limits` in hand.toml, or list \
+                 links that always overlap under `self_collision_exempt`"
+            }
+            Self::StartCollision => {
+                "the hand overlaps the object before it closes: a candidate stands too deep, or the object has walls that no \
+                 approach gets around"
+            }
+            Self::ForbiddenLink => {
+                "a link touches that is not among `contact_links` of hand.toml: add it there, or give the hand a pre-shape that \
+                 keeps it away"
+            }
+            Self::BelowSupportPlane => {
+                "the support plane is in the way: lower it, or lift or turn the object"
+            }
+            Self::NoContact => {
+                "fingers close past the object: check its scale, the hand's `opening_width`, and that `[closing]` names every \
+                 joint that bends"
+            }
+            Self::TooFewContacts => {
+                "one contact only: the object is small or slim beside the fingers; try pre-shapes that are less open"
+            }
+            Self::PalmOutsideSphere => {
+                "the palm ends farther than 0.30 m from the object's middle, where its position has no value: check the scale"
+            }
+            Self::NotForceClosure => {
+                "contacts that cannot resist every push: more tries, more friction (`[material]` of hand.toml, `material` of the \
+                 object), or more `contact_links`"
+            }
+        }
+    }
 }
 
 impl std::fmt::Display for Reason {
@@ -68,5 +103,12 @@ mod tests {
         for reason in Reason::ALL {
             assert_eq!(serde_json::to_string(&reason).unwrap(), format!("\"{reason}\""));
         }
+    }
+
+    #[test]
+    fn every_reason_has_a_hint_of_its_own() {
+        let hints: std::collections::BTreeSet<_> = Reason::ALL.iter().map(|r| r.hint()).collect();
+        assert_eq!(hints.len(), Reason::ALL.len());
+        assert!(hints.iter().all(|h| !h.contains("  ")), "one line each");
     }
 }

@@ -26,6 +26,9 @@ pub struct Description {
     /// Pairs of links whose overlap is not a collision, smaller index first, sorted. Links joined by a joint are
     /// always among them.
     pub self_collision_exempt: Vec<(LinkIdx, LinkIdx)>,
+    /// Mimic joints whose coupling lets go: closing goes on with them when the joint that drives them has been stopped,
+    /// and they may stand where their leaders would not put them. In order of their index.
+    pub break_away: Vec<JointIdx>,
 }
 
 /// The frame in which a hand approaches: origin on the palm's surface, z out of the palm, x the closing direction
@@ -97,7 +100,7 @@ impl Hand {
     /// q = origin + a₁ e₁ + a₂ e₂,   aᵢ = lowerᵢ + (egpcᵢ + 1)/2 · (upperᵢ − lowerᵢ)
     /// ```
     ///
-    /// with every joint then moved into its limits and mimic joints following. Coordinates outside [−1, 1] count as
+    /// with every joint then moved into its limits and all mimic joints following. Coordinates outside [−1, 1] count as
     /// the nearest end.
     ///
     /// # Panics
@@ -112,7 +115,7 @@ impl Hand {
                 values[joint.0] += amplitude * entry;
             }
         }
-        self.joint_positions_from_slice(&values)
+        self.coupled_positions(&values)
     }
 
     /// The palm frame's pose in the root link's frame.

@@ -19,14 +19,15 @@ pub fn urdf_named_in(hand_toml: &str) -> Result<Option<String>, HandError> {
 }
 
 impl Hand {
-    /// Adds what `hand.toml` says of the hand. All keys but `urdf`, `self_collision_exempt` and `material.links` are
-    /// needed; unknown keys are refused.
+    /// Adds what `hand.toml` says of the hand. All keys but `urdf`, `self_collision_exempt`, `break_away` and
+    /// `material.links` are needed; unknown keys are refused.
     ///
     /// ```toml
     /// urdf = "gripper.urdf"                    # beside this file
     /// opening_width = 0.08                     # m, the widest object the hand closes around, along the palm's x
     /// contact_links = ["palm", "left", "right"]             # which links may touch the object
     /// self_collision_exempt = [["left", "right"]]           # pairs that may overlap, beside those a joint joins
+    /// break_away = []                          # mimic joints that close on when the joint that drives them is stopped
     ///
     /// [palm]
     /// link = "palm"
@@ -75,6 +76,8 @@ struct File {
     contact_links: Vec<String>,
     #[serde(default)]
     self_collision_exempt: Vec<[String; 2]>,
+    #[serde(default)]
+    break_away: Vec<String>,
     palm: PalmEntry,
     material: MaterialEntry,
     finger: Vec<FingerEntry>,
@@ -166,6 +169,7 @@ impl Reader<'_> {
             eigengrasps: self.eigengrasps(&file.eigengrasp)?,
             opening_width: file.opening_width,
             self_collision_exempt: self.exempt(&file.self_collision_exempt)?,
+            break_away: self.break_away(&file.break_away)?,
         })
     }
 
@@ -357,6 +361,22 @@ impl Reader<'_> {
             pairs.insert((a.min(b), a.max(b)));
         }
         Ok(pairs.into_iter().collect())
+    }
+
+    fn break_away(&self, names: &[String]) -> Result<Vec<JointIdx>, HandError> {
+        let mut joints = BTreeSet::new();
+        for name in names {
+            let joint = self.joint("break_away", name)?;
+            if self.hand.joint(joint).mimic.is_none() {
+                return Err(wrong(
+                    "break_away",
+                    format!("`{name}`, which mimics no other joint"),
+                    "mimic joints only: a free joint always closes on by itself",
+                ));
+            }
+            joints.insert(joint);
+        }
+        Ok(joints.into_iter().collect())
     }
 
     fn links(&self, key: &str, names: &[String]) -> Result<Vec<LinkIdx>, HandError> {

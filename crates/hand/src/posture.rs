@@ -8,7 +8,7 @@ use crate::{Hand, HandError, JointIdx};
 const LIMIT_SLACK: f64 = 1e-6;
 
 /// One position (rad or m) per movable joint of a hand, in the order of [`Hand::joints`]; mimic joints stand where
-/// their leaders put them.
+/// their leaders put them, except those whose coupling lets go (`break_away`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointPositions(pub(crate) Vec<f64>);
 
@@ -32,7 +32,7 @@ impl Hand {
     ///
     /// [`HandError::UnknownJoint`]; [`HandError::OutOfLimits`] for a value that is not finite or lies more than 1e-6
     /// outside; [`HandError::MimicMismatch`] where a mimic joint is given and does not stand where its leader puts
-    /// it.
+    /// it, unless its coupling lets go (`break_away`).
     pub fn positions(&self, by_name: &BTreeMap<String, f64>) -> Result<JointPositions, HandError> {
         let mut values: Vec<f64> = self
             .joints
@@ -49,7 +49,7 @@ impl Hand {
             };
             let joint = &self.joints[idx];
             let inside = joint.lower - LIMIT_SLACK <= value && value <= joint.upper + LIMIT_SLACK;
-            if !value.is_finite() || (joint.mimic.is_none() && !inside) {
+            if !value.is_finite() || (!self.is_follower(idx) && !inside) {
                 return Err(HandError::OutOfLimits {
                     joint: name.clone(),
                     value,
@@ -59,7 +59,11 @@ impl Hand {
             }
             values[idx] = value;
         }
-        self.follow(&mut values);
+        for (idx, joint) in self.joints.iter().enumerate() {
+            if !(self.breaks_away(idx) && by_name.contains_key(&joint.name)) {
+                self.follow(idx, &mut values);
+            }
+        }
         for (joint, &expected) in self.joints.iter().zip(&values) {
             if let (Some(mimic), Some(&value)) = (joint.mimic, by_name.get(&joint.name))
                 && (value - expected).abs() > LIMIT_SLACK
@@ -76,7 +80,8 @@ impl Hand {
     }
 
     /// A posture from one value per movable joint, in the order of [`Hand::joints`]: each is moved into its joint's
-    /// limits, and mimic joints are put where their leaders demand, whatever stands in their place.
+    /// limits, and mimic joints are put where their leaders demand, whatever stands in their place; those whose
+    /// coupling lets go (`break_away`) keep their own value.
     ///
     /// # Panics
     ///
@@ -88,13 +93,20 @@ impl Hand {
             "one position per movable joint of `{}`",
             self.name
         );
-        let mut values: Vec<f64> = values
-            .iter()
-            .zip(&self.joints)
-            .map(|(v, j)| v.clamp(j.lower, j.upper))
-            .collect();
-        self.follow(&mut values);
-        JointPositions(values)
+        let mut placed = self.within_limits(values);
+        for idx in (0..placed.len()).filter(|idx| self.is_follower(*idx)) {
+            self.follow(idx, &mut placed);
+        }
+        JointPositions(placed)
+    }
+
+    /// The same, with every mimic joint where its leader demands.
+    pub(crate) fn coupled_positions(&self, values: &[f64]) -> JointPositions {
+        let mut placed = self.within_limits(values);
+        for idx in 0..placed.len() {
+            self.follow(idx, &mut placed);
+        }
+        JointPositions(placed)
     }
 
     /// A posture by name, mimic joints among them: the inverse of [`Hand::positions`].
@@ -106,13 +118,26 @@ impl Hand {
             .collect()
     }
 
-    /// Puts every mimic joint where its leader demands.
-    pub(crate) fn follow(&self, values: &mut [f64]) {
-        for (idx, joint) in self.joints.iter().enumerate() {
-            if let Some(mimic) = joint.mimic {
-                values[idx] = mimic.multiplier * values[mimic.joint.0] + mimic.offset;
-            }
+    fn within_limits(&self, values: &[f64]) -> Vec<f64> {
+        let joints = values.iter().zip(&self.joints);
+        joints.map(|(v, j)| v.clamp(j.lower, j.upper)).collect()
+    }
+
+    /// Puts a mimic joint where its leader demands.
+    fn follow(&self, idx: usize, values: &mut [f64]) {
+        if let Some(mimic) = self.joints[idx].mimic {
+            values[idx] = mimic.multiplier * values[mimic.joint.0] + mimic.offset;
         }
+    }
+
+    /// Whether a joint always stands where another puts it.
+    fn is_follower(&self, idx: usize) -> bool {
+        self.joints[idx].mimic.is_some() && !self.breaks_away(idx)
+    }
+
+    fn breaks_away(&self, idx: usize) -> bool {
+        let description = self.description.as_ref();
+        description.is_some_and(|d| d.break_away.binary_search(&JointIdx(idx)).is_ok())
     }
 
     /// The joints' names, comma separated, for messages.

@@ -107,6 +107,12 @@ fn values_must_make_sense() {
             &format!("hand.toml, opening_width: found {found}; expected a positive width in metres"),
         );
     }
+    assert_changed_says(
+        "exempt = []",
+        "exempt = []\nbreak_away = [\"spread\"]",
+        "hand.toml, break_away: found `spread`, which mimics no other joint; expected mimic joints only: a free joint \
+         always closes on by itself",
+    );
     let orientation =
         "either `rpy`, or the directions `approach` (out of the palm) and `closing` (thumb to fingers)";
     assert_changed_says(
