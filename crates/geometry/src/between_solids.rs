@@ -55,7 +55,7 @@ fn bodies(a: &ConvexBody, b: &ConvexBody, a_from_b: &Isometry3<f64>) -> f64 {
     match parry_bridge::body_to_body(a, b, a_from_b) {
         Closest::Apart(p, q) => (p - q).norm(),
         // An unsettled iteration means that the cores are as good as touching.
-        Closest::Intersecting | Closest::Unsettled => 0.0,
+        Closest::Intersecting | Closest::Beyond(..) | Closest::Unsettled => 0.0,
     }
 }
 

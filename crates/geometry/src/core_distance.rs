@@ -1,13 +1,13 @@
 //! How far a solid's core is from the triangles of a tree.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use parry3d_f64::partitioning::{BvhNode, TraversalAction};
 
 use crate::closest;
 use crate::collider::{Collider, Core};
-use crate::parry_bridge::{self, Closest};
+use crate::parry_bridge::{self, Closest, ConvexBody};
 use crate::triangle_tree::TriangleTree;
 
 /// The closest points of a tree and a solid's core, both in the tree's frame; equal where they meet.
@@ -28,36 +28,67 @@ impl TriangleTree {
         below: f64,
     ) -> Option<Nearest> {
         let placed = PlacedBounds::new(collider, tree_from_core);
-        // GJK is dear: a triangle beyond a plane that stands `best` off the core needs none.
-        let last_plane: Cell<Option<Plane>> = Cell::new(None);
-        let is_convex = matches!(collider.core, Core::Convex(_));
-        let found = self.bvh.find_best(
-            below,
-            |node, _| placed.distance(node),
-            |i, best| {
-                let triangle = &self.triangles[i as usize];
-                if is_convex {
-                    let beyond = last_plane
-                        .get()
-                        .is_some_and(|plane| plane.distance(triangle) >= best);
-                    if beyond || placed.distance_to_plane_of(triangle) >= best {
-                        return None;
-                    }
-                }
+        // A triangle beyond a plane that stands `best` off the core need not be looked at.
+        let planes = RefCell::new(Planes::default());
+        let leaf = |i: u32, best: f64| {
+            let triangle = &self.triangles[i as usize];
+            let is_flat = !matches!(collider.core, Core::Mesh(_) | Core::Point);
+            if is_flat && placed.distance_to_plane_of(triangle) >= best {
+                return None;
+            }
+            let Core::Convex(body) = &collider.core else {
                 let pair = core_to_triangle(collider, tree_from_core, triangle, best)?;
-                let distance = (pair.0 - pair.1).norm();
-                if is_convex && distance < best {
-                    last_plane.set(Plane::at(&pair.0, &(pair.1 - pair.0)));
+                return Some(((pair.0 - pair.1).norm(), pair));
+            };
+            let mut planes = planes.borrow_mut();
+            if planes.distance_of(triangle) >= best {
+                return None;
+            }
+            let pair = planes.convex_to_triangle(collider, body, tree_from_core, triangle, best)?;
+            let distance = (pair.0 - pair.1).norm();
+            if distance < best {
+                let normal = (pair.1 - pair.0).try_normalize(1e-6);
+                planes.add(normal.map(|n| Plane::on_core(body, tree_from_core, n)));
+            }
+            Some((distance, pair))
+        };
+        // Where the search begins well, planes leave little to look at.
+        let mut seed = None;
+        let is_convex = matches!(collider.core, Core::Convex(_));
+        if is_convex {
+            let reach = below + collider.core_half.norm();
+            let first = self.near_triangle(&placed.center.into(), reach * (1.0 + 1e-9))?;
+            seed = leaf(first, below)
+                .filter(|(distance, _)| *distance < below)
+                .map(|s| (first, s));
+            let again = seed.as_ref().and_then(|(_, (distance, (on_core, _)))| {
+                let (_, _, second) = self.nearest_point(on_core, *distance)?;
+                let found = leaf(second, *distance)?;
+                (found.0 < *distance).then_some((second, found))
+            });
+            seed = again.or(seed);
+        }
+        let best = seed.as_ref().map_or(below, |(_, (distance, _))| *distance);
+        let found = self.bvh.find_best(
+            best,
+            |node, best| {
+                let apart = placed.distance(node, best);
+                if is_convex && apart < best {
+                    apart.max(planes.borrow().distance(node))
+                } else {
+                    apart
                 }
-                Some((distance, pair))
             },
+            leaf,
         );
-        found.map(|(triangle, (distance, (on_core, on_tree)))| Nearest {
-            distance,
-            on_tree,
-            on_core,
-            triangle,
-        })
+        found
+            .or(seed)
+            .map(|(triangle, (distance, (on_core, on_tree)))| Nearest {
+                distance,
+                on_tree,
+                on_core,
+                triangle,
+            })
     }
 
     /// Calls `visit` with every triangle that may be closer to the core than `within` (some may be farther).
@@ -70,7 +101,7 @@ impl TriangleTree {
     ) {
         let placed = PlacedBounds::new(collider, tree_from_core);
         self.bvh.traverse(|node| {
-            if placed.distance(node) > within {
+            if placed.distance(node, f64::INFINITY) > within {
                 return TraversalAction::Prune;
             }
             if let Some(leaf) = node.leaf_data() {
@@ -81,7 +112,7 @@ impl TriangleTree {
     }
 }
 
-/// Closest points (core, triangle) in the triangle's frame; `None` only where a mesh core is not closer than `below`.
+/// Closest points (core, triangle) in the triangle's frame; `None` only where they are not closer than `below`.
 pub(crate) fn core_to_triangle(
     collider: &Collider,
     tree_from_core: &Isometry3<f64>,
@@ -97,11 +128,9 @@ pub(crate) fn core_to_triangle(
             let [p, q] = segment(tree_from_core, *half);
             Some(closest::of_segment_and_triangle(&p, &q, triangle))
         }
-        Core::Convex(body) => match parry_bridge::triangle_to_body(triangle, body, tree_from_core) {
-            Closest::Apart(on_triangle, on_core) => Some((on_core, on_triangle)),
-            Closest::Intersecting => Some((triangle[0], triangle[0])),
-            Closest::Unsettled => Some(by_features(collider, tree_from_core, triangle)),
-        },
+        Core::Convex(body) => {
+            Planes::default().convex_to_triangle(collider, body, tree_from_core, triangle, below)
+        }
         Core::Mesh(tree) => {
             let local = triangle.map(|p| tree_from_core.inverse_transform_point(&p));
             let low = local[0].inf(&local[1]).inf(&local[2]);
@@ -152,27 +181,94 @@ fn by_features(
     })
 }
 
-/// A plane that touches a convex core in its closest point to some triangle, its normal away from the core.
-#[derive(Clone, Copy)]
+/// A plane that touches a convex core, its normal away from the core.
+#[derive(Clone, Copy, Default)]
 struct Plane {
     normal: Vector3<f64>,
     height: f64,
 }
 
 impl Plane {
-    /// By the theorem of separating planes the core lies below it; a hair is added for rounding.
-    fn at(on_core: &Point3<f64>, towards_triangle: &Vector3<f64>) -> Option<Self> {
-        let normal = towards_triangle.try_normalize(1e-6)?;
-        Some(Self {
-            normal,
-            height: normal.dot(&on_core.coords) + 1e-9,
-        })
+    /// The plane with this unit normal.
+    fn on_core(body: &ConvexBody, tree_from_core: &Isometry3<f64>, normal: Vector3<f64>) -> Self {
+        let height = normal.dot(&body.farthest(tree_from_core, &normal).coords);
+        Self { normal, height }
+    }
+}
+
+/// How many planes are kept: contacts in a hollow need several.
+const N_PLANES: usize = 6;
+
+/// The last planes that were found.
+#[derive(Default)]
+struct Planes {
+    all: [Plane; N_PLANES],
+    n_found: usize,
+}
+
+impl Planes {
+    fn add(&mut self, plane: Option<Plane>) {
+        if let Some(plane) = plane {
+            self.all[self.n_found % N_PLANES] = plane;
+            self.n_found += 1;
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &Plane> {
+        self.all[..self.n_found.min(N_PLANES)].iter()
     }
 
     /// A lower bound of a triangle's distance from the core; may be negative.
-    fn distance(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-        let height = |p: &Point3<f64>| self.normal.dot(&p.coords);
-        height(a).min(height(b)).min(height(c)) - self.height
+    fn distance_of(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
+        let distance = |plane: &Plane| {
+            let height = |p: &Point3<f64>| plane.normal.dot(&p.coords);
+            height(a).min(height(b)).min(height(c)) - plane.height
+        };
+        self.iter().map(distance).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// A lower bound of the distance of everything in a node from the core; may be negative.
+    fn distance(&self, node: &BvhNode) -> f64 {
+        let (center, half) = parry_bridge::node_bounds(node);
+        let (center, half) = (Vector3::from(center), Vector3::from(half));
+        let distance =
+            |plane: &Plane| plane.normal.dot(&center) - plane.normal.abs().dot(&half) - plane.height;
+        self.iter().map(distance).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Closest points (core, triangle); `None` where they are not closer than `below`, by a plane that is then kept.
+    fn convex_to_triangle(
+        &mut self,
+        collider: &Collider,
+        body: &ConvexBody,
+        tree_from_core: &Isometry3<f64>,
+        triangle: &[Point3<f64>; 3],
+        below: f64,
+    ) -> Option<(Point3<f64>, Point3<f64>)> {
+        // From the core to the triangle's plane, if it lies on one side of it.
+        let [a, b, c] = triangle;
+        let normal = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE);
+        let towards = normal.map(|n| {
+            let center = tree_from_core * Point3::from(collider.core_center);
+            if n.dot(&(a - center)) < 0.0 { -n } else { n }
+        });
+        if let Some(normal) = towards {
+            let plane = Plane::on_core(body, tree_from_core, normal);
+            if normal.dot(&a.coords) - plane.height >= below {
+                self.add(Some(plane));
+                return None;
+            }
+        }
+        match parry_bridge::triangle_to_body(triangle, body, tree_from_core, below, towards.as_ref()) {
+            Closest::Apart(on_triangle, on_core) => Some((on_core, on_triangle)),
+            Closest::Intersecting => Some((triangle[0], triangle[0])),
+            Closest::Beyond(normal, on_core) => {
+                let height = normal.dot(&on_core.coords);
+                self.add(Some(Plane { normal, height }));
+                None
+            }
+            Closest::Unsettled => Some(by_features(collider, tree_from_core, triangle)),
+        }
     }
 }
 
@@ -198,14 +294,17 @@ impl PlacedBounds {
         }
     }
 
-    /// A lower bound of the distance between the core and everything in the node.
-    fn distance(&self, node: &BvhNode) -> f64 {
+    /// A lower bound of the distance between the core and everything in the node; a rough one will do from `enough` on.
+    fn distance(&self, node: &BvhNode, enough: f64) -> f64 {
         let (center, half) = parry_bridge::node_bounds(node);
         let (center, half) = (Vector3::from(center), Vector3::from(half));
         let between = center - self.center;
         let in_tree = (between.abs() - half - self.half_in_tree)
             .sup(&Vector3::zeros())
             .norm_squared();
+        if in_tree >= enough * enough {
+            return in_tree.sqrt();
+        }
         let local = self.rotation.tr_mul(&between);
         let in_core = (local.abs() - self.abs_rotation.tr_mul(&half) - self.half)
             .sup(&Vector3::zeros())

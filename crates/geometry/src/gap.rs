@@ -49,13 +49,23 @@ impl Surface {
             .is_some()
     }
 
-    /// A lower bound of the gap from the distance grid at the balls that cover the solid; may be negative.
+    /// A lower bound of the gap from the distance grid, mostly without looking at a triangle; may be negative.
+    ///
+    /// Of a solid far away it is that of the ball around it (one place of the grid), nearer by that of the balls that cover
+    /// it: far away it is at least half of what all balls would tell.
     pub fn gap_lower_bound(&self, solid: &Collider, surface_from_solid: &Isometry3<f64>) -> f64 {
+        let ball = solid.bounding_ball();
+        let around = self.distance_lower_bound(&(surface_from_solid * ball.center)) - ball.radius;
+        if around >= ball.radius || solid.cover().len() == 1 {
+            return around;
+        }
+        let rotation = surface_from_solid.rotation.to_rotation_matrix();
         let mut least = f64::INFINITY;
         for ball in solid.cover() {
-            least = least.min(self.distance_lower_bound(&(surface_from_solid * ball.center)) - ball.radius);
+            let center = rotation * ball.center + surface_from_solid.translation.vector;
+            least = least.min(self.distance_lower_bound(&center) - ball.radius);
         }
-        least
+        least.max(around)
     }
 
     /// Every pair of features closer than `tolerance`: the closest points of near triangles, the surface's vertices near

@@ -1,6 +1,6 @@
 //! The one place where nalgebra's types become those of parry and back.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Rotation, Vector};
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
@@ -30,7 +30,13 @@ impl ConvexBody {
     }
 
     pub(crate) fn points(points: &[P]) -> Self {
-        Self::Points(Points(points.iter().map(vector).collect()))
+        Self::Points(Points::new(points))
+    }
+
+    /// The point of the body, placed by `pose`, that is farthest along a direction.
+    pub(crate) fn farthest(&self, pose: &Isometry3<f64>, direction: &Vector3<f64>) -> P {
+        let local = pose.rotation.inverse_transform_vector(direction);
+        pose * point(self.local_support_point(Vector::new(local.x, local.y, local.z)))
     }
 }
 
@@ -54,21 +60,43 @@ impl SupportMap for ZCylinder {
     }
 }
 
+/// Coordinates of points, four at a time, the last point repeated: so processors compare several at once.
 #[derive(Debug, Clone)]
-pub(crate) struct Points(Vec<Vector>);
+pub(crate) struct Points(Vec<[[f64; 4]; 3]>);
+
+impl Points {
+    fn new(points: &[P]) -> Self {
+        let four = |part: &[P]| {
+            let at = |k: usize| std::array::from_fn(|i| part[i.min(part.len() - 1)][k]);
+            [at(0), at(1), at(2)]
+        };
+        Self(points.chunks(4).map(four).collect())
+    }
+}
 
 impl SupportMap for Points {
-    fn local_support_point(&self, direction: Vector) -> Vector {
-        let mut best = self.0[0];
-        let mut farthest = best.dot(direction);
-        for p in &self.0[1..] {
-            let along = p.dot(direction);
-            if along > farthest {
-                farthest = along;
-                best = *p;
+    fn local_support_point(&self, d: Vector) -> Vector {
+        let along = |[x, y, z]: &[[f64; 4]; 3]| -> [f64; 4] {
+            std::array::from_fn(|i| x[i] * d.x + y[i] * d.y + z[i] * d.z)
+        };
+        let mut farthest = [f64::NEG_INFINITY; 4];
+        let mut part = [0; 4];
+        for (idx, four) in self.0.iter().enumerate() {
+            let along = along(four);
+            for i in 0..4 {
+                let is_farther = along[i] > farthest[i];
+                farthest[i] = if is_farther { along[i] } else { farthest[i] };
+                part[i] = if is_farther { idx as u64 } else { part[i] };
             }
         }
-        best
+        let mut best = 0;
+        for i in 1..4 {
+            if farthest[i] > farthest[best] || farthest[i] == farthest[best] && part[i] < part[best] {
+                best = i;
+            }
+        }
+        let [x, y, z] = self.0[part[best] as usize];
+        Vector::new(x[best], y[best], z[best])
     }
 }
 
@@ -77,22 +105,38 @@ pub(crate) enum Closest {
     Intersecting,
     /// Closest points on the first and the second body, both in the first one's frame.
     Apart(P, P),
+    /// They are farther apart than asked about, seen along this unit direction, on which the second body ends here.
+    Beyond(Vector3<f64>, P),
     /// The iteration did not settle; the caller needs another way.
     Unsettled,
 }
 
-/// Closest points of a triangle and a convex body placed in the triangle's frame.
-pub(crate) fn triangle_to_body(triangle: &[P; 3], body: &ConvexBody, pose: &Isometry3<f64>) -> Closest {
+/// Closest points of a triangle and a convex body placed in the triangle's frame, where they are not farther apart than
+/// `below`. `towards` is where the search starts: from the body to the triangle, about.
+pub(crate) fn triangle_to_body(
+    triangle: &[P; 3],
+    body: &ConvexBody,
+    pose: &Isometry3<f64>,
+    below: f64,
+    towards: Option<&Vector3<f64>>,
+) -> Closest {
     let [a, b, c] = triangle.map(|p| vector(&p));
-    closest(&Triangle::new(a, b, c), body, pose)
+    let start = towards.map(|v| Vector::new(-v.x, -v.y, -v.z));
+    closest(&Triangle::new(a, b, c), body, pose, below, start)
 }
 
 /// Closest points of two convex bodies, the second one placed in the first one's frame.
 pub(crate) fn body_to_body(first: &ConvexBody, second: &ConvexBody, pose: &Isometry3<f64>) -> Closest {
-    closest(first, second, pose)
+    closest(first, second, pose, f64::MAX, None)
 }
 
-fn closest(first: &impl SupportMap, second: &impl SupportMap, pose: &Isometry3<f64>) -> Closest {
+fn closest(
+    first: &impl SupportMap,
+    second: &impl SupportMap,
+    pose: &Isometry3<f64>,
+    below: f64,
+    start: Option<Vector>,
+) -> Closest {
     let (r, t) = (pose.rotation.coords, pose.translation.vector);
     let pose = Pose::from_parts(
         Vector::new(t.x, t.y, t.z),
@@ -103,13 +147,22 @@ fn closest(first: &impl SupportMap, second: &impl SupportMap, pose: &Isometry3<f
         &pose,
         first,
         second,
-        f64::MAX,
+        below.min(f64::MAX),
         &mut simplex,
-        None,
+        start,
     ) {
         GJKResult::Intersection => Closest::Intersecting,
         GJKResult::ClosestPoints(a, b, _) => Closest::Apart(point(a), point(b)),
-        GJKResult::NoIntersection(_) | GJKResult::Proximity(_) => Closest::Unsettled,
+        GJKResult::NoIntersection(d) => {
+            let (on_first, on_second) = (first.local_support_point(d), second.support_point(&pose, -d));
+            // Unless the iteration was given up, the direction shows it.
+            if (on_second - on_first).dot(d) > below {
+                Closest::Beyond(Vector3::new(-d.x, -d.y, -d.z), point(on_second))
+            } else {
+                Closest::Unsettled
+            }
+        }
+        GJKResult::Proximity(_) => Closest::Unsettled,
     }
 }
 
@@ -120,6 +173,11 @@ pub(crate) fn tree(triangles: &[[P; 3]]) -> Bvh {
         .enumerate()
         .map(|(i, [a, b, c])| (i, Aabb::new(vector(&a.inf(b).inf(c)), vector(&a.sup(b).sup(c)))));
     Bvh::from_iter(BvhBuildStrategy::Binned, bounds)
+}
+
+/// Lowest and highest coordinates of a tree node's bounds.
+pub(crate) fn node_corners(node: &BvhNode) -> ([f64; 3], [f64; 3]) {
+    (node.mins().to_array(), node.maxs().to_array())
 }
 
 /// Centre and half lengths of a tree node's bounds.

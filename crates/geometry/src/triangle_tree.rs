@@ -25,15 +25,28 @@ impl TriangleTree {
 
     /// The nearest triangle's point closer than `below`, as (distance, point, triangle).
     pub(crate) fn nearest_point(&self, p: &Point3<f64>, below: f64) -> Option<(f64, Point3<f64>, u32)> {
+        // Squared distances are as good to compare, and need no roots.
         let found = self.bvh.find_best(
-            below,
-            |node, _| node_distance(node, p),
+            (below * below).max(f64::MIN_POSITIVE),
+            |node, _| squared_distance(node, p),
             |i, _| {
                 let q = closest::on_triangle(p, &self.triangles[i as usize]);
-                Some(((q - p).norm(), q))
+                Some(((q - p).norm_squared(), q))
             },
         );
-        found.map(|(i, (d, q))| (d, q, i))
+        found
+            .map(|(i, (_, q))| ((q - p).norm(), q, i))
+            .filter(|(distance, ..)| *distance < below)
+    }
+
+    /// Some triangle with bounds closer to `p` than `below`: the one that a descent towards `p` ends in.
+    pub(crate) fn near_triangle(&self, p: &Point3<f64>, below: f64) -> Option<u32> {
+        let found = self.bvh.find_best(
+            (below * below).max(f64::MIN_POSITIVE),
+            |node, _| squared_distance(node, p),
+            |_, _| Some(f64::NEG_INFINITY),
+        );
+        found.map(|(i, _)| i)
     }
 
     /// Where a ray from `origin` first meets a triangle (either side), as (distance, triangle). `direction` is unit.
@@ -54,11 +67,11 @@ impl TriangleTree {
     }
 }
 
-fn node_distance(node: &BvhNode, p: &Point3<f64>) -> f64 {
-    let (center, half) = parry_bridge::node_bounds(node);
-    ((p.coords - Vector3::from(center)).abs() - Vector3::from(half))
-        .sup(&Vector3::zeros())
-        .norm()
+fn squared_distance(node: &BvhNode, p: &Point3<f64>) -> f64 {
+    let (low, high) = parry_bridge::node_corners(node);
+    let beyond = |k: usize| (low[k] - p[k]).max(p[k] - high[k]).max(0.0);
+    let [x, y, z] = [beyond(0), beyond(1), beyond(2)];
+    x * x + y * y + z * z
 }
 
 /// Where a ray enters a node's bounds; infinite where it misses.
