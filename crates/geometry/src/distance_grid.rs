@@ -80,12 +80,23 @@ struct Cell {
 }
 
 impl Cell {
+    /// How far the corners are from the point, metres.
+    #[inline]
+    fn ways(&self) -> [f64; 8] {
+        let squares: [[f64; 2]; 3] = std::array::from_fn(|k| {
+            let t = self.place[k];
+            [t * t, (1.0 - t) * (1.0 - t)]
+        });
+        std::array::from_fn(|i| {
+            (squares[0][i & 1] + squares[1][i >> 1 & 1] + squares[2][i >> 2]).sqrt() * self.size
+        })
+    }
+
     /// The side of the point, from the first corner that is nearer to it than to any surface.
     fn side(&self) -> Option<bool> {
+        let ways = self.ways();
         (0..8).find_map(|i| {
-            let corner = Vector3::new(i & 1, i >> 1 & 1, i >> 2 & 1).map(|b| b as f64);
-            let apart = (self.place - corner).norm() * self.size;
-            (self.corners[i].abs() * (1.0 - ROUNDING) > apart).then_some(self.corners[i] < 0.0)
+            (self.corners[i].abs() * (1.0 - ROUNDING) > ways[i]).then_some(self.corners[i] < 0.0)
         })
     }
 }
@@ -159,12 +170,9 @@ impl DistanceGrid {
             return (p.coords - nearest).norm();
         };
         let cell = self.cell(coarse, idx, place);
-        let mut bound = 0.0_f64;
-        for (i, d) in cell.corners.iter().enumerate() {
-            let corner = Vector3::new(i & 1, i >> 1 & 1, i >> 2 & 1).map(|b| b as f64);
-            bound = bound.max(d.abs() * (1.0 - ROUNDING) - (cell.place - corner).norm() * cell.size);
-        }
-        bound
+        let corners = cell.corners.iter().zip(cell.ways());
+        let bounds = corners.map(|(d, way)| d.abs() * (1.0 - ROUNDING) - way);
+        bounds.fold(0.0, f64::max)
     }
 
     /// Which side of the surface a point is on, where a node is nearer to it than to any surface.

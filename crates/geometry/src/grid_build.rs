@@ -280,9 +280,12 @@ fn distances(
                 .map(|p| (p - middle).norm_squared())
                 .fold(0.0, f64::max)
                 .sqrt();
+            let [a, b, c] = corners;
+            let normal = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE);
             Near {
                 middle,
                 radius,
+                normal: normal.unwrap_or_else(Vector3::zeros),
                 corners,
             }
         })
@@ -327,18 +330,28 @@ fn distances(
     any.then_some(brick)
 }
 
-/// A triangle and a ball around it.
+/// A triangle and a disc around it.
 #[derive(Clone, Copy)]
 struct Near {
     middle: Point3<f64>,
     radius: f64,
+    /// Unit; zero for a triangle without area.
+    normal: Vector3<f64>,
     corners: [Point3<f64>; 3],
 }
 
 impl Near {
     fn may_be_within(&self, p: &Point3<f64>, limit: f64) -> bool {
         let sure = limit + self.radius;
-        (self.middle - p).norm_squared() < sure * sure
+        let from_middle = p - self.middle;
+        let squared = from_middle.norm_squared();
+        if squared >= sure * sure {
+            return false;
+        }
+        // No nearer than the disc: above it by the height, beside it by what the way along its plane exceeds the radius.
+        let height = self.normal.dot(&from_middle);
+        let beside = (squared - height * height).max(0.0).sqrt() - self.radius;
+        beside <= 0.0 && height.abs() < limit || height * height + beside * beside < limit * limit
     }
 }
 

@@ -44,21 +44,24 @@ pub(crate) fn spread(
 ) {
     let mut stack: Vec<usize> = (0..distances.len()).filter(|&i| known[i].is_some()).collect();
     let mut next = 0;
+    // Neighbours across edges and corners of a cell, too: sides go farther along them where the surface is oblique.
+    let lengths = [0.0, 1.0, 2.0_f64.sqrt(), 3.0_f64.sqrt()].map(|steps| steps * size * (1.0 + 1e-6));
+    let strides = [1, counts[0], counts[0] * counts[1]];
     loop {
         while let Some(i) = stack.pop() {
-            let mut stride = 1;
-            for n in counts {
-                let at = i / stride % n;
-                let before = (at > 0).then(|| i - stride);
-                let after = (at + 1 < n).then(|| i + stride);
-                for j in before.into_iter().chain(after) {
-                    let apart = f64::from(distances[i]) + f64::from(distances[j]);
-                    if known[j].is_none() && apart > size * (1.0 + 1e-6) {
-                        known[j] = known[i];
-                        stack.push(j);
-                    }
+            let at: [usize; 3] = std::array::from_fn(|k| i / strides[k] % counts[k]);
+            for step in 0..27 {
+                let steps = [step % 3, step / 3 % 3, step / 9];
+                if (0..3).any(|k| at[k] + steps[k] == 0 || at[k] + steps[k] > counts[k]) {
+                    continue;
                 }
-                stride *= n;
+                let j = (0..3).map(|k| (at[k] + steps[k] - 1) * strides[k]).sum::<usize>();
+                let n_steps = steps.iter().filter(|s| **s != 1).count();
+                let apart = f64::from(distances[i]) + f64::from(distances[j]);
+                if known[j].is_none() && apart > lengths[n_steps] {
+                    known[j] = known[i];
+                    stack.push(j);
+                }
             }
         }
         let Some(i) = (next..known.len()).find(|&i| known[i].is_none()) else {
