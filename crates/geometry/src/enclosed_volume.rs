@@ -13,10 +13,11 @@ const FULLNESS: f64 = 1e-3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VolumeMethod {
-    /// The surface is closed: the sum of signed tetrahedra over its triangles, exact.
+    /// The surface is closed (each edge has two triangles, wound alike): the sum of signed tetrahedra over its triangles,
+    /// exact. What several parts of it enclose counts once for each.
     SignedVolume,
-    /// The surface has holes: the integral of the winding number of the surface with each hole closed by a fan about the
-    /// middle of its rim. Exact for flat holes.
+    /// The surface has holes, or edges of more than two triangles: the integral of the winding number of the surface with
+    /// each hole closed by a fan about the middle of its rim. Exact for flat holes, and where there are none.
     WindingNumber,
     /// Nothing sensible is enclosed (a sheet, or windings that contradict each other): the volume of the convex hull.
     ConvexHull,
@@ -55,9 +56,11 @@ pub fn enclosed_volume(mesh: &TriMesh) -> EnclosedVolume {
     let triangles = position_triangles(mesh);
     let edges = Edges::new(&triangles);
     let mut consistent = true;
+    let mut is_closed = true;
     let mut open = Vec::new();
     for (ends, sides) in edges.iter() {
         open.extend(rim(ends, sides));
+        is_closed &= sides.len() == 2;
         consistent &= !matches!(sides, [one, other] if one.upward == other.upward);
     }
     let (low, high) = mesh.axis_aligned_bounds();
@@ -77,7 +80,7 @@ pub fn enclosed_volume(mesh: &TriMesh) -> EnclosedVolume {
             .sum::<f64>();
     }
     let volume = (sum / 6.0).abs();
-    if open.is_empty() && consistent {
+    if is_closed && consistent {
         return EnclosedVolume {
             volume,
             method: VolumeMethod::SignedVolume,
@@ -121,6 +124,38 @@ mod tests {
                 assert!((inside.volume - 8.0).abs() < 1e-9, "{n} {inside:?}");
                 assert_eq!(inside.method == VolumeMethod::SignedVolume, n == 0);
             }
+        }
+    }
+
+    #[test]
+    fn bodies_that_share_an_edge_are_not_closed_but_have_the_sum_of_their_volumes() {
+        let (low, high) = (
+            cube(1.0),
+            cube(1.0).transformed(&Isometry3::translation(1.0, 0.0, 1.0)),
+        );
+        let vertices = [low.vertices(), high.vertices()].concat();
+        let triangles = [low.triangles(), high.triangles()].concat();
+        let second = |t: &[u32; 3]| t.map(|v| v + 8);
+        let triangles = (triangles[..12].iter().copied()).chain(triangles[12..].iter().map(second));
+        let inside = enclosed_volume(&TriMesh::new(vertices, triangles.collect()).unwrap());
+        assert!((inside.volume - 2.0).abs() < 1e-12);
+        assert_eq!(inside.method, VolumeMethod::WindingNumber);
+    }
+
+    #[test]
+    fn a_shell_in_a_shell_counts_once_more_and_a_cavity_is_taken_off() {
+        let (outer, inner) = (cube(2.0), cube(1.0));
+        let vertices = [outer.vertices(), inner.vertices()].concat();
+        for (turned, expected) in [(false, 9.0), (true, 7.0)] {
+            let second = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|v| v + 8);
+                if turned { [a, c, b] } else { [a, b, c] }
+            };
+            let triangles = outer.triangles().iter().copied();
+            let triangles = triangles.chain(inner.triangles().iter().map(second)).collect();
+            let inside = enclosed_volume(&TriMesh::new(vertices.clone(), triangles).unwrap());
+            assert!((inside.volume - expected).abs() < 1e-12, "{inside:?}");
+            assert_eq!(inside.method, VolumeMethod::SignedVolume);
         }
     }
 
