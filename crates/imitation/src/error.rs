@@ -28,6 +28,16 @@ pub enum ImitationError {
         what: &'static str,
     },
 
+    /// The imitator's model does not know its training data's units.
+    #[error(
+        "node `{node}` of the imitator's model does not say by which units its training data were standardised; \
+         train it with `prehend train`, or take the units from grasps"
+    )]
+    Unscaled {
+        /// The node.
+        node: String,
+    },
+
     /// λ is no weight.
     #[error("lambda is {lambda}; expected a number from 0 (similarity alone) to 1 (task alone)")]
     Lambda {

@@ -97,7 +97,10 @@ impl Arguments {
         };
         let posterior = recognise(&teacher, &shown)?;
         let task = posterior.most_probable().to_owned();
-        let scales = Scales::of(&all);
+        let scales = Scales::of_model(&pupil).unwrap_or_else(|error| {
+            eprintln!("note: {error}; this answer takes them from the candidates");
+            Scales::of(&all)
+        });
         let ranked_objects = rank_objects(&pupil, &task, &shown, &objects, &scales, weighing)?;
         let ranked_grasps = rank_grasps(&pupil, &task, &shown, &candidates, &scales, weighing)?;
         let probabilities: Map<String, Value> = posterior

@@ -158,7 +158,7 @@ impl<'a> Shown<'a> {
         };
         let answer = || {
             let posterior = recognise(&teacher.model, &self.features).map_err(Error::input)?;
-            let choice = Choice::new(self.imitator, experiments, &held_out)?;
+            let choice = Choice::new(self.imitator, experiments, &pupil.model)?;
             let mut run = choice.of(&pupil.model, posterior.most_probable(), &self.features)?;
             run.network.clone_from(&network.name);
             run.demonstration.clone_from(&self.grasp_id);
@@ -225,18 +225,16 @@ struct Choice {
 }
 
 impl Choice {
-    fn new(imitator: &Dataset, experiments: &Experiments, held_out: &[String]) -> Result<Self, Error> {
+    fn new(
+        imitator: &Dataset,
+        experiments: &Experiments,
+        pupil: &prehend_model::Model,
+    ) -> Result<Self, Error> {
         let all = features(&imitator.grasps)?;
         let (ids, names) = (
             imitator.grasps.texts("grasp_id")?,
             imitator.grasps.texts("object")?,
         );
-        let training: Vec<Features> = all
-            .iter()
-            .zip(&names)
-            .filter(|(_, n)| !held_out.contains(n))
-            .map(|(f, _)| *f)
-            .collect();
         let grasps: Vec<Candidate> = (0..ids.len())
             .filter(|&r| experiments.c.candidates.contains(&names[r]))
             .map(|r| Candidate {
@@ -261,7 +259,7 @@ impl Choice {
         Ok(Self {
             objects,
             grasps,
-            scales: Scales::of(&training),
+            scales: Scales::of_model(pupil).map_err(Error::input)?,
             lambda: experiments.c.lambda,
         })
     }
