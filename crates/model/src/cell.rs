@@ -14,13 +14,15 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::cpd::{Sign, Weights, n_mixture_parameters};
+use crate::cpd::{Scaling, Sign, Weights, n_mixture_parameters};
 use crate::cross_validation::{HeldOut, best_held_out, choose_priors, cross_validate, mean};
-use crate::em::{Rows, expect};
+use crate::em::{Rows, expect, resume};
 use crate::family::{Cells, Family};
-use crate::moments::{CovariancePrior, Mixing, Moment, RIDGE, Settings};
+use crate::measured::Measured;
+use crate::moments::{CovariancePrior, Mixing, Moment, RIDGE, Settings, maximize};
 use crate::network::{MixtureOrder, MixtureSpec};
 use crate::start::{FitOptions, Robust, fit_orders};
+use crate::statistics::EarlierCell;
 use crate::train::TrainOptions;
 
 /// BIC differences below this are no evidence; the smaller mixture wins.
@@ -38,6 +40,10 @@ pub(crate) struct CellTask<'a> {
     pub family: &'a Family,
     pub options: TrainOptions,
     pub grouped: bool,
+    /// Name of each group; `None` for a row that stands alone.
+    pub group_names: &'a [Option<String>],
+    /// What rows that are no longer here said of the node, cell by cell; empty for none.
+    pub earlier: &'a [EarlierCell],
 }
 
 /// What came out.
@@ -50,6 +56,10 @@ pub(crate) struct FittedCell {
     pub moments: Vec<Vec<Moment>>,
     /// What a row's weight counts here.
     pub scale: f64,
+    /// What was measured of the cell itself.
+    pub measured: Measured,
+    /// The moments of the cell itself where it is pooled, and `moments` are those of all cells.
+    pub own_moments: Option<Vec<Vec<Moment>>>,
     pub report: CellReport,
     pub warnings: Vec<String>,
 }
@@ -111,6 +121,14 @@ impl CellReport {
             .collect();
         format!(" given {}", parts.join(", "))
     }
+    /// [`CellReport::label`], empty where there are no discrete parents.
+    pub(crate) fn place(&self) -> String {
+        if self.configuration.is_empty() {
+            String::new()
+        } else {
+            self.label()
+        }
+    }
     /// BIC of the chosen fit.
     pub fn bic(&self) -> Option<f64> {
         self.curve
@@ -154,6 +172,36 @@ pub(crate) fn fit_cells(tasks: &[CellTask]) -> Vec<FittedCell> {
         .collect()
 }
 
+/// Goes on from what earlier rows said, with the numbers of components that they chose.
+///
+/// The components of earlier rows stay as they were given (incremental EM, Neal and Hinton 1998), so the objective never
+/// falls; with one component this is the fit to all rows.
+pub(crate) fn refit(task: &CellTask) -> FittedCell {
+    let cell = Prepared::new(task);
+    let settings = &cell.rows.settings;
+    let start = maximize(settings, &cell.rows.earlier);
+    let (_, moments) = expect(&cell.rows, &start);
+    let options = fit_options(&task.options);
+    let fit = resume(
+        &cell.rows,
+        maximize(settings, &moments),
+        options.max_steps,
+        options.tolerance,
+    );
+    let k = fit.mixing.k();
+    let fits = vec![(
+        k,
+        Robust {
+            fit,
+            reinitialized: 0,
+            dropped: 0,
+        },
+    )];
+    let mut fitted = conclude(task, cell, fits, 0, None);
+    fitted.report.curve.clear();
+    fitted
+}
+
 /// Runs the work in the given order, and returns the results in index order.
 pub(crate) fn in_order<T: Send>(order: &[usize], work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let mut out: Vec<(usize, T)> = order.par_iter().with_max_len(1).map(|&j| (j, work(j))).collect();
@@ -185,19 +233,19 @@ pub(crate) fn stream(task: &CellTask, k: usize, fold: usize) -> ChaCha8Rng {
 pub(crate) struct Prepared {
     pub rows: Rows,
     pub groups: Option<Vec<usize>>,
-    n_rows: usize,
     pub n_effective: f64,
     scale: f64,
     constant: bool,
     pooled: bool,
     orders: Vec<usize>,
+    measured: Measured,
     warnings: Vec<String>,
 }
 
 impl Prepared {
     fn new(task: &CellTask) -> Self {
         let mut prepared = Self::of(task, task.cell);
-        let n_rows = prepared.rows.n();
+        let measured = prepared.measured.clone();
         let enough = prepared.n_effective >= prepared.rows.settings.least_mass() || task.cell.is_none();
         if !enough {
             let found = prepared.n_effective;
@@ -215,7 +263,7 @@ impl Prepared {
                 .warnings
                 .push("hardly a row is complete; EM starts with gaps filled by the columns' means".into());
         }
-        prepared.n_rows = n_rows;
+        prepared.measured = measured;
         prepared
     }
 
@@ -239,51 +287,30 @@ impl Prepared {
             z.push(1.0);
             z.extend(parents.iter().map(|column| filled(column[row])));
         }
-        let floor = spec
-            .noise_floor
-            .iter()
-            .zip(&cells.scaling[task.node].standard_deviation)
-            .map(|(f, s)| f / s)
-            .collect();
         // Pooled cells are a stand-in and share nothing; one configuration alone neither.
         let together = configuration.is_none() && task.cell.is_none();
-        let settings = Settings {
-            d,
-            q,
-            weights: if together {
-                spec.weights
-            } else {
-                Weights::PerConfiguration
-            },
-            tied: spec.shared_covariance,
-            floor,
-            latent_sign: spec.sign == Sign::Latent,
-            ridge: vec![RIDGE; 1 + q],
-            prior: CovariancePrior::WEAK,
-        };
-        let total: f64 = weights.iter().sum();
-        let squares: f64 = weights.iter().map(|w| w * w).sum();
-        let mut n_effective = if squares > 0.0 {
-            total * total / squares
-        } else {
-            0.0
-        };
+        let mut settings = settings(spec, &cells.scaling[task.node], q, together);
+        let earlier = EarlierCell::of(task.earlier, configuration, task.cell.is_some());
+        if let Some(earlier) = &earlier {
+            settings.prior = earlier.prior;
+            settings.ridge.clone_from(&earlier.ridge);
+        }
         let m = settings.m();
         let values: Vec<&[f64]> = z.chunks_exact(m).map(|row| &row[..d]).collect();
-        let constant = groups.as_ref().is_some_and(|groups| is_constant(&values, groups));
+        let mut measured = Measured::of(&values, &weights, groups.as_deref(), task.group_names);
+        if let Some(earlier) = &earlier {
+            measured = measured.joined(&earlier.measured);
+        }
+        let constant = measured.is_constant();
+        let n_effective = measured.n_effective();
         let mut warnings = Vec::new();
-        if constant {
-            let mut distinct = groups.clone().unwrap_or_default();
-            distinct.sort_unstable();
-            distinct.dedup();
-            n_effective = distinct.len() as f64;
-        } else if groups.is_none() && repeats(&values) {
+        if !constant && groups.is_none() && repeats(&values) {
             warnings.push(
                 "most values repeat exactly; if they were measured once per object, say which column names it (group)"
                     .into(),
             );
         }
-        let scale = if total > 0.0 { n_effective / total } else { 1.0 };
+        let scale = measured.scale();
         for weight in &mut weights {
             *weight *= scale;
         }
@@ -297,10 +324,10 @@ impl Prepared {
             z,
             weights,
             ends,
+            earlier: earlier.map_or_else(Vec::new, |earlier| earlier.scaled(scale)),
         };
         let orders = orders(spec, &rows, n_effective, constant);
         Self {
-            n_rows: rows.n(),
             rows,
             groups,
             n_effective,
@@ -308,8 +335,28 @@ impl Prepared {
             constant,
             pooled: false,
             orders,
+            measured,
             warnings,
         }
+    }
+}
+
+/// What a cell is fitted with, in units of the node. `together`: several configurations that share something.
+pub(crate) fn settings(spec: &MixtureSpec, unit: &Scaling, q: usize, together: bool) -> Settings {
+    let units = spec.noise_floor.iter().zip(&unit.standard_deviation);
+    Settings {
+        d: spec.columns.len(),
+        q,
+        weights: if together {
+            spec.weights
+        } else {
+            Weights::PerConfiguration
+        },
+        tied: spec.shared_covariance,
+        floor: units.map(|(f, s)| f / s).collect(),
+        latent_sign: spec.sign == Sign::Latent,
+        ridge: vec![RIDGE; 1 + q],
+        prior: CovariancePrior::WEAK,
     }
 }
 
@@ -335,19 +382,6 @@ fn orders(spec: &MixtureSpec, rows: &Rows, n_effective: f64, constant: bool) -> 
         MixtureOrder::Fixed(k) => vec![k.min(((n_effective / least) as usize).max(1))],
         MixtureOrder::Bic { max, .. } => (1..=max.min(most)).collect(),
     }
-}
-
-/// Whether every group has one value, and some group has several rows.
-fn is_constant(values: &[&[f64]], groups: &[usize]) -> bool {
-    let mut first = std::collections::BTreeMap::new();
-    for (value, group) in values.iter().zip(groups) {
-        let known = *first.entry(*group).or_insert(*value);
-        // In standardised units: what a text file's sixth digit may change.
-        if known.iter().zip(*value).any(|(a, b)| (a - b).abs() > 1e-5) {
-            return false;
-        }
-    }
-    first.len() < values.len()
 }
 
 /// Whether rows outnumber distinct values three to one.
@@ -421,7 +455,7 @@ fn conclude(
     }
     let report = CellReport {
         configuration: Vec::new(),
-        n_rows: cell.n_rows,
+        n_rows: cell.measured.n_rows,
         n_effective: cell.n_effective,
         constant_in_groups: cell.constant,
         components,
@@ -433,6 +467,10 @@ fn conclude(
         pooled: cell.pooled,
         objectives: chosen.fit.objectives,
     };
+    let own_moments = cell.pooled.then(|| {
+        let own = Prepared::of(task, task.cell);
+        expect(&own.rows, &chosen.fit.mixing).1
+    });
     let rows = if task.family.with_gaps {
         let place = if cell.pooled { None } else { task.cell };
         let start = task.family.members(place).start;
@@ -452,6 +490,8 @@ fn conclude(
         rows,
         moments,
         scale: cell.scale,
+        measured: cell.measured,
+        own_moments,
         report,
         warnings,
     }

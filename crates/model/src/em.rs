@@ -5,11 +5,13 @@
 //! ```
 //!
 //! One pass over the rows, in blocks that stay in the cache, gives the log-likelihood and the moments that the M-step
-//! (`moments.rs`) needs; nothing of the size of the data is stored. The two products of a block go through faer.
+//! (`moments.rs`) needs; nothing of the size of the data is stored. The two products of a block go through faer; between
+//! them all loops run over the rows of the block, several at once.
 
 use faer::{Accum, MatMut, MatRef, Par, linalg::matmul::matmul};
 use nalgebra::DMatrix;
 
+use crate::exponential::exp_below_zero;
 use crate::gaussian::{LOG_TAU, cholesky, solve_lower};
 use crate::moments::{Mixing, Moment, Regression, Settings, log_prior, maximize};
 
@@ -27,6 +29,8 @@ pub(crate) struct Rows {
     pub weights: Vec<f64>,
     /// End of each configuration's rows: rows are sorted by configuration.
     pub ends: Vec<usize>,
+    /// Moments of each configuration and component over rows that are no longer here; empty for none.
+    pub earlier: Vec<Vec<Moment>>,
 }
 
 /// A fit and how it came about.
@@ -59,7 +63,7 @@ impl Rows {
         let start = if cell == 0 { 0 } else { self.ends[cell - 1] };
         start..self.ends[cell]
     }
-    /// The given rows, in rising order.
+    /// The given rows, in rising order, without the earlier ones.
     pub fn select(&self, rows: &[usize]) -> Self {
         Self {
             settings: self.settings.clone(),
@@ -70,6 +74,7 @@ impl Rows {
                 .iter()
                 .map(|&end| rows.partition_point(|&i| i < end))
                 .collect(),
+            earlier: Vec::new(),
         }
     }
 }
@@ -115,6 +120,8 @@ pub(crate) fn acting(settings: &Settings, log_weights: &[f64], components: &[Reg
 /// Stacked white maps of several acting components, and the buffer for their residuals.
 struct Stack {
     d: usize,
+    m: usize,
+    /// m × (d · components): one column for each dimension of each component.
     maps: Vec<f64>,
     constants: Vec<f64>,
     residuals: Vec<f64>,
@@ -122,65 +129,73 @@ struct Stack {
 
 impl Stack {
     fn new(d: usize, m: usize, acting: &[Acting]) -> Self {
-        let rows = d * acting.len();
-        let mut maps = vec![0.0; rows * m];
-        for (a, part) in acting.iter().enumerate() {
-            for j in 0..m {
-                for i in 0..d {
-                    maps[j * rows + a * d + i] = part.white[(i, j)];
-                }
-            }
-        }
+        let maps = acting
+            .iter()
+            .flat_map(|part| (0..d).flat_map(move |i| (0..m).map(move |j| part.white[(i, j)])));
         Self {
             d,
-            maps,
+            m,
+            maps: maps.collect(),
             constants: acting.iter().map(|part| part.constant).collect(),
-            residuals: vec![0.0; rows * BLOCK],
+            residuals: vec![0.0; d * acting.len() * BLOCK],
         }
     }
 
-    /// Log densities of the block's rows: all components of the first row, of the second …
+    /// Log densities of the block's n rows: all rows under the first component, under the second …
     fn log_densities(&mut self, z: &[f64], n: usize, out: &mut Vec<f64>) {
-        let a = self.constants.len();
-        let (rows, m) = (self.d * a, z.len() / n);
+        let columns = self.d * self.constants.len();
         matmul(
-            MatMut::from_column_major_slice_mut(&mut self.residuals[..rows * n], rows, n),
+            MatMut::from_column_major_slice_mut(&mut self.residuals[..n * columns], n, columns),
             Accum::Replace,
-            MatRef::from_column_major_slice(&self.maps, rows, m),
-            MatRef::from_column_major_slice(z, m, n),
+            MatRef::from_row_major_slice(z, n, self.m),
+            MatRef::from_column_major_slice(&self.maps, self.m, columns),
             1.0,
             Par::Seq,
         );
         out.clear();
-        for residuals in self.residuals[..rows * n].chunks_exact(rows) {
-            let squares = residuals
-                .chunks_exact(self.d)
-                .map(|part| part.iter().map(|r| r * r).sum::<f64>());
-            out.extend(
-                squares
-                    .zip(&self.constants)
-                    .map(|(square, constant)| constant - 0.5 * square),
-            );
+        for (constant, part) in self.constants.iter().zip(self.residuals.chunks_exact(n * self.d)) {
+            let start = out.len();
+            out.resize(start + n, *constant);
+            for dimension in part.chunks_exact(n) {
+                for (log, residual) in out[start..].iter_mut().zip(dimension) {
+                    *log -= 0.5 * residual * residual;
+                }
+            }
         }
     }
 }
 
-/// Turns log densities into shares of their sum, and returns the logarithm of the sum.
-fn normalize(logs: &mut [f64]) -> f64 {
-    let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if max == f64::NEG_INFINITY {
-        logs.fill(1.0 / logs.len() as f64);
-        return max;
+/// Turns log densities of n rows into shares of each row's sum; `totals` become the logarithms of the sums.
+fn normalize(logs: &mut [f64], n: usize, totals: &mut Vec<f64>) {
+    totals.clear();
+    totals.resize(n, f64::NEG_INFINITY);
+    for part in logs.chunks_exact(n) {
+        for (total, log) in totals.iter_mut().zip(part) {
+            *total = if log > total { *log } else { *total };
+        }
     }
-    let mut sum = 0.0;
-    for log in logs.iter_mut() {
-        *log = (*log - max).exp();
-        sum += *log;
+    let mut sums = [0.0; BLOCK];
+    let n_parts = logs.len() / n;
+    for part in logs.chunks_exact_mut(n) {
+        for ((log, total), sum) in part.iter_mut().zip(totals.iter()).zip(&mut sums) {
+            *log = exp_below_zero(*log - total);
+            *sum += *log;
+        }
     }
-    for share in logs.iter_mut() {
-        *share /= sum;
+    for part in logs.chunks_exact_mut(n) {
+        for (share, sum) in part.iter_mut().zip(&sums) {
+            *share /= sum;
+        }
     }
-    max + sum.ln()
+    for (b, (total, sum)) in totals.iter_mut().zip(&sums).enumerate() {
+        if *total == f64::NEG_INFINITY {
+            for share in logs.iter_mut().skip(b).step_by(n) {
+                *share = 1.0 / n_parts as f64;
+            }
+        } else {
+            *total += sum.ln();
+        }
+    }
 }
 
 /// Sums responsibilities times z zᵀ, block by block.
@@ -188,8 +203,8 @@ pub(crate) struct Gatherer {
     d: usize,
     m: usize,
     n_components: usize,
+    latent_sign: bool,
     products: Vec<f64>,
-    shares: Vec<f64>,
     signed: Vec<f64>,
     packed: Vec<f64>,
     packed_signed: Vec<f64>,
@@ -205,8 +220,8 @@ impl Gatherer {
             d: settings.d,
             m,
             n_components,
+            latent_sign: settings.latent_sign,
             products: vec![0.0; t * BLOCK],
-            shares: vec![0.0; n_components * BLOCK],
             signed: vec![0.0; both * n_components * BLOCK],
             packed: vec![0.0; t * n_components],
             packed_signed: vec![0.0; both * t * n_components],
@@ -214,9 +229,10 @@ impl Gatherer {
         }
     }
 
-    /// One block; `share` gives plus and minus shares of a row for a component, times its weight.
-    fn add(&mut self, z: &[f64], n: usize, share: impl Fn(usize, usize) -> (f64, f64)) {
-        let (m, k) = (self.m, self.n_components);
+    /// One block. `shares` has those of all rows for the first component, for the second …, and with a latent sign those
+    /// of −y after them; it becomes shares times weights.
+    fn add(&mut self, z: &[f64], weights: &[f64], shares: &mut [f64]) {
+        let (n, m, k) = (weights.len(), self.m, self.n_components);
         let t = m * (m + 1) / 2;
         for (row, out) in z.chunks_exact(m).zip(self.products.chunks_exact_mut(t)) {
             let mut at = 0;
@@ -228,15 +244,20 @@ impl Gatherer {
                 at += m - i;
             }
         }
-        for c in 0..k {
-            for b in 0..n {
-                let (plus, minus) = share(b, c);
-                self.shares[c * n + b] = plus + minus;
-                self.masses[c] += plus + minus;
-                if !self.signed.is_empty() {
-                    self.signed[c * n + b] = plus - minus;
-                }
+        for part in shares.chunks_exact_mut(n) {
+            for (share, weight) in part.iter_mut().zip(weights) {
+                *share *= weight;
             }
+        }
+        if self.latent_sign {
+            let (plus, minus) = shares.split_at_mut(k * n);
+            for ((signed, plus), minus) in self.signed.iter_mut().zip(plus).zip(minus) {
+                *signed = *plus - *minus;
+                *plus += *minus;
+            }
+        }
+        for (mass, part) in self.masses.iter_mut().zip(shares.chunks_exact(n)) {
+            *mass += part.iter().sum::<f64>();
         }
         let gather = |packed: &mut [f64], shares: &[f64]| {
             matmul(
@@ -248,8 +269,8 @@ impl Gatherer {
                 Par::Seq,
             );
         };
-        gather(&mut self.packed, &self.shares);
-        if !self.signed.is_empty() {
+        gather(&mut self.packed, shares);
+        if self.latent_sign {
             gather(&mut self.packed_signed, &self.signed);
         }
     }
@@ -262,7 +283,7 @@ impl Gatherer {
                 let mut at = c * t;
                 for i in 0..self.m {
                     for j in i..self.m {
-                        let between = i < self.d && j >= self.d && !self.packed_signed.is_empty();
+                        let between = i < self.d && j >= self.d && self.latent_sign;
                         let value = if between {
                             self.packed_signed[at]
                         } else {
@@ -282,16 +303,15 @@ impl Gatherer {
     }
 }
 
-/// The E-step: Σ wᵢ log p, and the moments of each configuration and component.
+/// The E-step: Σ wᵢ log p, and the moments of each configuration and component, those of earlier rows included.
 pub(crate) fn expect(rows: &Rows, mixing: &Mixing) -> (f64, Vec<Vec<Moment>>) {
     let (settings, k) = (&rows.settings, mixing.k());
     let m = settings.m();
     let mut log_likelihood = 0.0;
-    let mut logs = Vec::new();
+    let (mut logs, mut totals) = (Vec::new(), Vec::new());
     let moments = (0..rows.ends.len())
         .map(|cell| {
             let parts = acting(settings, &mixing.log_weights[cell], mixing.set(cell));
-            let a = parts.len();
             let mut stack = Stack::new(settings.d, m, &parts);
             let mut gatherer = Gatherer::new(settings, k);
             let range = rows.cell(cell);
@@ -300,34 +320,53 @@ pub(crate) fn expect(rows: &Rows, mixing: &Mixing) -> (f64, Vec<Vec<Moment>>) {
                 let z = &rows.z[start * m..(start + n) * m];
                 stack.log_densities(z, n, &mut logs);
                 let weights = &rows.weights[start..start + n];
-                for (logs, weight) in logs.chunks_exact_mut(a).zip(weights) {
-                    log_likelihood += weight * normalize(logs);
-                }
-                gatherer.add(z, n, |b, c| {
-                    let minus = if a > k { logs[b * a + k + c] } else { 0.0 };
-                    (weights[b] * logs[b * a + c], weights[b] * minus)
-                });
+                normalize(&mut logs, n, &mut totals);
+                log_likelihood += totals.iter().zip(weights).map(|(log, w)| log * w).sum::<f64>();
+                gatherer.add(z, weights, &mut logs);
             }
-            gatherer.finish()
+            let mut moments = gatherer.finish();
+            if let Some(earlier) = rows.earlier.get(cell) {
+                for (moment, earlier) in moments.iter_mut().zip(earlier) {
+                    moment.add(earlier);
+                }
+                log_likelihood += earlier_log_likelihood(&parts, earlier);
+            }
+            moments
         })
         .collect();
     (log_likelihood, moments)
 }
 
+/// Expected log density of earlier rows and of the components that they were given to: Σₖ [mass · constant − ½ tr W M Wᵀ].
+fn earlier_log_likelihood(parts: &[Acting], earlier: &[Moment]) -> f64 {
+    // With a latent sign the parts of +1 stand first, and moments count y with the sign under which it belongs.
+    let pairs = parts.iter().zip(earlier);
+    pairs
+        .map(|(part, moment)| {
+            let square = (&part.white * &moment.product).dot(&part.white);
+            moment.mass * part.constant - 0.5 * square
+        })
+        .sum()
+}
+
 /// Moments of rows with given shares: plus and minus shares of row and component.
 pub(crate) fn gather(rows: &Rows, k: usize, share: impl Fn(usize, usize) -> (f64, f64)) -> Vec<Vec<Moment>> {
     let m = rows.settings.m();
+    let mut shares = Vec::new();
     (0..rows.ends.len())
         .map(|cell| {
             let mut gatherer = Gatherer::new(&rows.settings, k);
             let range = rows.cell(cell);
             for start in range.clone().step_by(BLOCK) {
                 let n = BLOCK.min(range.end - start);
-                gatherer.add(&rows.z[start * m..(start + n) * m], n, |b, c| {
-                    let (plus, minus) = share(start + b, c);
-                    let weight = rows.weights[start + b];
-                    (weight * plus, weight * minus)
-                });
+                shares.clear();
+                let pairs = || (0..k).flat_map(|c| (start..start + n).map(move |i| (i, c)));
+                shares.extend(pairs().map(|(i, c)| share(i, c).0));
+                if rows.settings.latent_sign {
+                    shares.extend(pairs().map(|(i, c)| share(i, c).1));
+                }
+                let z = &rows.z[start * m..(start + n) * m];
+                gatherer.add(z, &rows.weights[start..start + n], &mut shares);
             }
             gatherer.finish()
         })
@@ -339,7 +378,7 @@ pub(crate) fn row_log_densities(rows: &Rows, mixing: &Mixing) -> Vec<f64> {
     let settings = &rows.settings;
     let m = settings.m();
     let mut out = Vec::with_capacity(rows.n());
-    let mut logs = Vec::new();
+    let (mut logs, mut totals) = (Vec::new(), Vec::new());
     for cell in 0..rows.ends.len() {
         let parts = acting(settings, &mixing.log_weights[cell], mixing.set(cell));
         let mut stack = Stack::new(settings.d, m, &parts);
@@ -347,7 +386,8 @@ pub(crate) fn row_log_densities(rows: &Rows, mixing: &Mixing) -> Vec<f64> {
         for start in range.clone().step_by(BLOCK) {
             let n = BLOCK.min(range.end - start);
             stack.log_densities(&rows.z[start * m..(start + n) * m], n, &mut logs);
-            out.extend(logs.chunks_exact_mut(parts.len()).map(normalize));
+            normalize(&mut logs, n, &mut totals);
+            out.extend_from_slice(&totals);
         }
     }
     out

@@ -1,5 +1,7 @@
 //! The table in standardised units, and which of its rows have all that a node's fit needs.
 
+use serde::{Deserialize, Serialize};
+
 use crate::cpd::Scaling;
 use crate::error::ModelError;
 use crate::network::{MixtureSpec, Network, NodeKind};
@@ -16,17 +18,65 @@ pub(crate) struct Cells {
     pub states: Vec<Vec<Option<usize>>>,
     /// Per continuous node the units.
     pub scaling: Vec<Scaling>,
+    /// Per continuous node what the units come from, earlier rows included.
+    pub sums: Vec<Vec<ColumnSums>>,
+}
+
+/// What is known of a column's cells: how much they weigh, their mean, and Σ w (x − mean)².
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct ColumnSums {
+    weight: f64,
+    mean: f64,
+    square: f64,
+}
+
+impl ColumnSums {
+    fn of(column: &[f64], weights: &[f64]) -> Self {
+        let seen = || column.iter().zip(weights).filter(|(value, _)| !value.is_nan());
+        let weight: f64 = seen().map(|(_, w)| w).sum();
+        if weight <= 0.0 {
+            return Self::default();
+        }
+        let mean = seen().map(|(x, w)| w * x).sum::<f64>() / weight;
+        Self {
+            weight,
+            mean,
+            square: seen().map(|(x, w)| w * (x - mean) * (x - mean)).sum(),
+        }
+    }
+
+    /// Both together.
+    fn joined(self, other: Self) -> Self {
+        let weight = self.weight + other.weight;
+        if other.weight <= 0.0 || self.weight <= 0.0 {
+            return if other.weight > 0.0 { other } else { self };
+        }
+        let away = other.mean - self.mean;
+        Self {
+            weight,
+            mean: self.mean + away * other.weight / weight,
+            square: self.square + other.square + away * away * self.weight * other.weight / weight,
+        }
+    }
 }
 
 impl Cells {
-    pub fn read(network: &Network, table: &Table, weights: Vec<f64>) -> Result<Self, ModelError> {
+    /// Reads a table. `earlier` are the sums of rows that are no longer here, per continuous node; empty for none.
+    pub fn read(
+        network: &Network,
+        table: &Table,
+        weights: Vec<f64>,
+        earlier: &[Vec<ColumnSums>],
+    ) -> Result<Self, ModelError> {
         let mut cells = Self {
             weights,
             values: Vec::new(),
             states: Vec::new(),
             scaling: Vec::new(),
+            sums: Vec::new(),
         };
-        for node in network.nodes() {
+        for (i, node) in network.nodes().iter().enumerate() {
+            let mut sums = Vec::new();
             let mut values = Vec::new();
             let mut states = Vec::new();
             let mut scaling = Scaling {
@@ -40,23 +90,28 @@ impl Cells {
                 // Such a node reads its own rows.
                 NodeKind::VonMisesFisher(_) => {}
                 NodeKind::Mixture(spec) => {
-                    for column in &spec.columns {
+                    for (d, column) in spec.columns.iter().enumerate() {
                         let column = table.numbers(column, &node.name)?;
-                        let seen = |(value, weight): (&f64, &f64)| !value.is_nan() && *weight > 0.0;
-                        if !column.iter().zip(&cells.weights).any(seen) {
+                        let own = ColumnSums::of(&column, &cells.weights);
+                        let before = earlier.get(i).and_then(|sums| sums.get(d));
+                        let both = before.map_or(own, |before| before.joined(own));
+                        if both.weight <= 0.0 {
                             return Err(ModelError::NoRows {
                                 node: node.name.clone(),
                                 n_rows: table.n_rows(),
                             });
                         }
+                        sums.push(both);
                         values.push(column);
                     }
-                    scaling = standardise(&mut values, &cells.weights, spec);
+                    scaling = units(&sums, spec);
+                    standardise(&mut values, &scaling);
                 }
             }
             cells.values.push(values);
             cells.states.push(states);
             cells.scaling.push(scaling);
+            cells.sums.push(sums);
         }
         Ok(cells)
     }
@@ -84,21 +139,6 @@ impl Cells {
         }
         Some(configuration)
     }
-
-    /// Units of a node's continuous parents, one after the other.
-    pub fn parent_scaling(&self, network: &Network, node: usize) -> Scaling {
-        let mut scaling = Scaling {
-            mean: Vec::new(),
-            standard_deviation: Vec::new(),
-        };
-        for &parent in &network.nodes()[node].parents {
-            scaling.mean.extend(&self.scaling[parent].mean);
-            scaling
-                .standard_deviation
-                .extend(&self.scaling[parent].standard_deviation);
-        }
-        scaling
-    }
 }
 
 /// Rows that have every column of a node and of its parents.
@@ -118,17 +158,11 @@ pub(crate) struct Family {
 }
 
 impl Family {
-    pub fn read(network: &Network, node: usize, cells: &Cells, groups: Option<&[usize]>) -> Self {
+    /// `fill` takes rows with gaps where hardly one is complete.
+    pub fn read(network: &Network, node: usize, cells: &Cells, groups: Option<&[usize]>, fill: bool) -> Self {
         let spec = &network.nodes()[node];
         let is_discrete = |i: usize| matches!(network.nodes()[i].kind, NodeKind::Discrete { .. });
-        let n_configurations: usize = spec
-            .parents
-            .iter()
-            .map(|&parent| match &network.nodes()[parent].kind {
-                NodeKind::Discrete { states, .. } => states.len(),
-                NodeKind::Mixture(_) | NodeKind::VonMisesFisher(_) => 1,
-            })
-            .product();
+        let n_configurations = n_configurations(network, &spec.parents);
         let parents: Vec<usize> = spec
             .parents
             .iter()
@@ -158,7 +192,7 @@ impl Family {
         let least = cells.values[node].len() + q + 2;
         let n_complete: usize = of.iter().map(Vec::len).sum();
         let mut with_gaps = false;
-        if !is_discrete(node) && n_complete < least {
+        if fill && !is_discrete(node) && n_complete < least {
             of = sort(false);
             with_gaps = of.iter().map(Vec::len).sum::<usize>() > n_complete;
         }
@@ -191,24 +225,29 @@ impl Family {
     }
 }
 
-/// Subtracts each column's mean and divides by its standard deviation. Nodes with a latent sign keep their origin and
-/// share one unit; a constant column takes its noise floor, or a thousandth of its value, as unit.
-fn standardise(columns: &mut [Vec<f64>], weights: &[f64], spec: &MixtureSpec) -> Scaling {
+/// Joint states of the discrete ones among the parents.
+pub(crate) fn n_configurations(network: &Network, parents: &[usize]) -> usize {
+    let states = parents.iter().map(|&parent| match &network.nodes()[parent].kind {
+        NodeKind::Discrete { states, .. } => states.len(),
+        NodeKind::Mixture(_) | NodeKind::VonMisesFisher(_) => 1,
+    });
+    states.product()
+}
+
+/// Mean and standard deviation of each column. Nodes with a latent sign keep their origin and share one unit; a constant
+/// column takes its noise floor, or a thousandth of its value, as unit.
+pub(crate) fn units(sums: &[ColumnSums], spec: &MixtureSpec) -> Scaling {
     let mut scaling = Scaling {
         mean: Vec::new(),
         standard_deviation: Vec::new(),
     };
-    for (column, floor) in columns.iter().zip(&spec.noise_floor) {
-        let seen = || column.iter().zip(weights).filter(|(value, _)| !value.is_nan());
-        let total: f64 = seen().map(|(_, w)| w).sum();
-        let weighted =
-            |f: &dyn Fn(f64) -> f64| -> f64 { seen().map(|(x, w)| w * f(*x)).sum::<f64>() / total };
-        let mean = if is_centered(spec.sign) {
-            weighted(&|x| x)
+    for (sums, floor) in sums.iter().zip(&spec.noise_floor) {
+        let variance = sums.square / sums.weight;
+        let (mean, deviation) = if is_centered(spec.sign) {
+            (sums.mean, variance.sqrt())
         } else {
-            0.0
+            (0.0, (variance + sums.mean * sums.mean).sqrt())
         };
-        let deviation = weighted(&|x| (x - mean) * (x - mean)).sqrt();
         let least = floor.max(1e-9 * mean.abs());
         let unit = if deviation > least {
             deviation
@@ -225,13 +264,14 @@ fn standardise(columns: &mut [Vec<f64>], weights: &[f64], spec: &MixtureSpec) ->
         let common = (own.iter().map(|s| s * s).sum::<f64>() / own.len() as f64).sqrt();
         own.fill(common);
     }
-    for (column, (mean, unit)) in columns
-        .iter_mut()
-        .zip(scaling.mean.iter().zip(&scaling.standard_deviation))
-    {
+    scaling
+}
+
+fn standardise(columns: &mut [Vec<f64>], scaling: &Scaling) {
+    let units = scaling.mean.iter().zip(&scaling.standard_deviation);
+    for (column, (mean, unit)) in columns.iter_mut().zip(units) {
         for value in column {
             *value = (*value - mean) / unit;
         }
     }
-    scaling
 }

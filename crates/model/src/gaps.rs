@@ -43,6 +43,26 @@ pub struct GapReport {
     pub objectives: Vec<f64>,
 }
 
+impl GapReport {
+    /// What a person should know of it.
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        if self.left_out > 0 {
+            out.push(format!(
+                "{} of {} rows with gaps have too many combinations; only their complete families were learned from",
+                self.left_out, self.n_rows
+            ));
+        }
+        if !self.converged {
+            out.push(format!(
+                "EM over the rows with gaps ended after {} steps without settling",
+                self.steps
+            ));
+        }
+        out
+    }
+}
+
 /// Expected counts per node and configuration: of states, or moments of components.
 #[derive(Clone)]
 struct Expected {

@@ -38,21 +38,28 @@ mod model;
 mod priors;
 mod sample;
 
+mod assemble;
 mod cell;
 mod cross_validation;
 mod em;
+mod exponential;
 mod family;
 mod gap_block;
 mod gap_plan;
 mod gaps;
+mod groups;
 mod likelihood;
+mod measured;
 mod moments;
 mod start;
+mod statistics;
 mod train;
 
 mod structure;
 
 mod answer;
+mod draws;
+mod ensemble;
 mod evidence;
 mod mixture;
 mod posterior;
@@ -86,6 +93,7 @@ pub use block::Latent;
 pub use cell::{CellReport, OrderScore};
 pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 pub use direction_answer::DirectionAnswer;
+pub use ensemble::{Ensemble, EnsembleAnswer};
 pub use error::ModelError;
 pub use evidence::{Evidence, Observation};
 pub use explain::{Contrast, Counterfactual, Explanation};

@@ -9,6 +9,7 @@
 //! summed before it is maximized, so J never falls there either.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use crate::cpd::Weights;
 use crate::gaussian::{cholesky, solve_lower, solve_lower_transpose, symmetrize};
@@ -18,7 +19,7 @@ pub(crate) const RIDGE: f64 = 1e-6;
 
 /// Prior of a component's covariance: `rows` pseudo-rows (ν), each `deviation` (s) away from the mean, in units of the
 /// column's standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CovariancePrior {
     pub rows: f64,
     pub deviation: f64,
@@ -31,7 +32,8 @@ impl CovariancePrior {
         deviation: 0.01,
     };
 
-    fn scatter(self) -> f64 {
+    /// What the prior adds to each diagonal entry of the scatter.
+    pub fn scatter(self) -> f64 {
         self.rows * self.deviation * self.deviation
     }
 }
@@ -151,22 +153,16 @@ pub(crate) fn maximize(settings: &Settings, moments: &[Vec<Moment>]) -> Mixing {
                 .collect()
         })
         .collect();
-    let pooled: Vec<Vec<Moment>>;
+    let pooled: [Vec<Moment>; 1];
     let sets = if settings.weights == Weights::Shared && moments.len() > 1 {
-        let mut sum = moments[0].clone();
-        for cell in &moments[1..] {
-            for (a, b) in sum.iter_mut().zip(cell) {
-                a.add(b);
-            }
-        }
-        pooled = vec![sum];
-        &pooled
+        pooled = [pool(moments)];
+        &pooled[..]
     } else {
         moments
     };
     let mut components: Vec<Vec<Regression>> = sets
         .iter()
-        .map(|set| set.iter().map(|moment| regress(moment, settings)).collect())
+        .map(|set| set.iter().map(|moment| regress(moment, settings).0).collect())
         .collect();
     // Here `covariance` still holds the scatter without the prior's.
     let finish = |mut scatter: DMatrix<f64>, mass: f64| {
@@ -197,8 +193,20 @@ pub(crate) fn maximize(settings: &Settings, moments: &[Vec<Moment>]) -> Mixing {
     }
 }
 
-/// One regression from its moments; `covariance` is the scatter that it leaves.
-fn regress(moment: &Moment, settings: &Settings) -> Regression {
+/// Each component's moments summed over the configurations.
+pub(crate) fn pool(moments: &[Vec<Moment>]) -> Vec<Moment> {
+    let mut sum = moments[0].clone();
+    for cell in &moments[1..] {
+        for (a, b) in sum.iter_mut().zip(cell) {
+            a.add(b);
+        }
+    }
+    sum
+}
+
+/// One regression from its moments, and the Cholesky factor of its Gram matrix; `covariance` is the scatter that it
+/// leaves.
+pub(crate) fn regress(moment: &Moment, settings: &Settings) -> (Regression, DMatrix<f64>) {
     let (d, m) = (settings.d, settings.m());
     let yy = moment.product.view((0, 0), (d, d));
     let yx = moment.product.view((0, d), (d, m - d));
@@ -221,11 +229,11 @@ fn regress(moment: &Moment, settings: &Settings) -> Regression {
     let half = solve_lower(&lower, &yx.transpose());
     let slopes = solve_lower_transpose(&lower, &half).transpose();
     let covariance = yy - half.transpose() * &half;
-    Regression { slopes, covariance }
+    (Regression { slopes, covariance }, lower)
 }
 
 /// The covariance nearest in likelihood that is nowhere below the floor: eigenvalues in units of the floor, at least 1.
-fn clip(covariance: &DMatrix<f64>, floor: &[f64]) -> DMatrix<f64> {
+pub(crate) fn clip(covariance: &DMatrix<f64>, floor: &[f64]) -> DMatrix<f64> {
     let d = covariance.nrows();
     // A floor of zero becomes a relative one, for rounding's sake only.
     let unit: Vec<f64> = floor.iter().map(|f| f.max(1e-7)).collect();

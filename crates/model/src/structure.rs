@@ -20,9 +20,9 @@ pub(crate) use rules::RawRules;
 pub use rules::StructureRules;
 
 use crate::error::ModelError;
+use crate::groups::read_groups;
 use crate::network::Network;
 use crate::table::Table;
-use crate::train::read_groups;
 use family_score::{FitEffort, Sample, Scorer};
 use graph::{Graph, without};
 use rules::Legal;
@@ -261,7 +261,8 @@ impl Data {
                 table.n_rows()
             ));
         }
-        let groups: Option<Vec<usize>> = groups.map(|groups| rows.iter().map(|&row| groups[row]).collect());
+        let groups: Option<Vec<usize>> =
+            groups.map(|groups| rows.iter().map(|&row| groups.of_row[row]).collect());
         let score = match options.score {
             StructureScore::CrossValidated { folds } => {
                 StructureScore::CrossValidated { folds: folds.max(2) }

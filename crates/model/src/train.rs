@@ -5,16 +5,20 @@
 //! the rows that are complete for a family choose its number of components, and EM over the whole network goes on from
 //! there with all rows.
 
+use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::cell::{CellReport, CellTask, FittedCell, fit_cells};
-use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
+use crate::assemble::{assemble, discrete_parents, name_cells};
+use crate::cell::{CellReport, CellTask, FittedCell, fit_cells, refit};
+use crate::cpd::{Cpd, DiscreteCpd, Sign};
 use crate::error::{ModelError, list};
 use crate::family::{Cells, Family};
 use crate::gaps::{GapReport, fit_gaps, log_table};
+use crate::groups::read_groups;
 use crate::model::{Model, Node};
-use crate::network::{MixtureSpec, Network, NodeKind, NodeSpec};
+use crate::network::{MixtureOrder, Network, NodeKind, NodeSpec};
+use crate::statistics::{self, NodeStatistics, Statistics, shares};
 use crate::table::Table;
 use crate::von_mises_fisher_train::train_directions;
 
@@ -96,64 +100,140 @@ pub struct NodeReport {
 ///
 /// Section IV-B (EM and BIC per node); the guard against one component per object is ours.
 pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result<Trained, ModelError> {
+    learn(network, table, options, None)
+}
+
+impl Model {
+    /// The model after more rows, without those that it was trained on: training leaves in the model what it needs to go
+    /// on (`statistics` in the file).
+    ///
+    /// Tables, and nodes with one component, are what training on all rows at once gives, up to rounding. Mixtures keep
+    /// their numbers of components; earlier rows stay with the components that they were given to (incremental EM, Neal
+    /// and Hinton 1998), while the new rows move and the parameters follow both. Standardisation follows all rows.
+    /// The report counts all rows; its `log_likelihood` is that of the new ones.
+    ///
+    /// # Errors
+    ///
+    /// The model keeps no statistics (a person wrote it, or another program); as [`train`].
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use prehend_model::{Network, Table, TrainOptions, train};
+    ///
+    /// let network = Network::from_toml("[[node]]\nname = \"width\"\nkind = \"gaussian_mixture\"\nmixture = { components = 1 }\n")?;
+    /// let rows = |values: &[f64]| Table::new(values.len()).with_numbers("width", values.to_vec());
+    /// let options = TrainOptions::default();
+    /// let before = train(&network, &rows(&[0.03, 0.05, 0.04, 0.06])?, &options)?.model;
+    /// let after = before.update(&rows(&[0.08, 0.07])?, &options)?.model;
+    /// let at_once = train(&network, &rows(&[0.03, 0.05, 0.04, 0.06, 0.08, 0.07])?, &options)?.model;
+    /// let mean = |model: &prehend_model::Model| model.posterior(&["width"], &Default::default()).map(|a| a.terms[0].mean[0]);
+    /// assert!((mean(&after)? - mean(&at_once)?).abs() < 1e-12);
+    /// # Ok::<(), prehend_model::ModelError>(())
+    /// ```
+    pub fn update(&self, table: &Table, options: &TrainOptions) -> Result<Trained, ModelError> {
+        let (statistics, network) = Statistics::of(self)?;
+        let options = TrainOptions {
+            group: options.group.clone().or_else(|| statistics.group.clone()),
+            ..options.clone()
+        };
+        learn(&network, table, &options, Some(&statistics))
+    }
+}
+
+fn learn(
+    network: &Network,
+    table: &Table,
+    options: &TrainOptions,
+    earlier: Option<&Statistics>,
+) -> Result<Trained, ModelError> {
     let weights = check_weights(table, options)?;
     let mut warnings = Vec::new();
     let groups = read_groups(network, table, options.group.as_deref(), &mut warnings)?;
-    let table_cells = Cells::read(network, table, weights)?;
+    let (of_row, group_names) = match &groups {
+        Some(groups) => (Some(groups.of_row.as_slice()), groups.names.as_slice()),
+        None => (None, &[][..]),
+    };
+    let columns = earlier.map_or_else(Vec::new, |earlier| earlier.columns(network));
+    let table_cells = Cells::read(network, table, weights, &columns)?;
     let families: Vec<Family> = (0..network.nodes().len())
-        .map(|node| Family::read(network, node, &table_cells, groups.as_deref()))
+        .map(|node| Family::read(network, node, &table_cells, of_row, earlier.is_none()))
         .collect();
+    let earlier_cells = earlier.map_or_else(
+        || vec![Vec::new(); network.nodes().len()],
+        |earlier| earlier.in_units(network, &table_cells.scaling),
+    );
     let mut tasks = Vec::new();
     for (i, (node, family)) in network.nodes().iter().zip(&families).enumerate() {
         if let NodeKind::Mixture(spec) = &node.kind {
-            if family.rows.is_empty() {
+            if family.rows.is_empty() && earlier.is_none() {
                 return Err(ModelError::NoRows {
                     node: node.name.clone(),
                     n_rows: table.n_rows(),
                 });
             }
-            tasks.extend(cell_tasks(
-                i,
+            let together = shares(spec) && family.ends.len() > 1;
+            let configurations = if together {
+                vec![None]
+            } else {
+                (0..family.ends.len()).map(Some).collect()
+            };
+            tasks.extend(configurations.into_iter().map(|cell| CellTask {
+                node: i,
+                cell,
                 spec,
-                &table_cells,
+                cells: &table_cells,
                 family,
-                options,
-                groups.is_some(),
-            ));
+                options: options.clone(),
+                grouped: groups.is_some(),
+                group_names,
+                earlier: &earlier_cells[i],
+            }));
         }
     }
-    let mut fitted = fit_cells(&tasks);
-    let mut counts: Vec<Vec<Vec<f64>>> = network
-        .nodes()
-        .iter()
-        .zip(&families)
-        .enumerate()
-        .map(|(i, (node, family))| count(i, node, family, &table_cells))
-        .collect();
-    for (node, counts) in network.nodes().iter().zip(&counts) {
+    let mut fitted = match earlier {
+        None => fit_cells(&tasks),
+        Some(_) => tasks.par_iter().map(refit).collect(),
+    };
+    let mut counts = Vec::with_capacity(families.len());
+    for (i, (node, family)) in network.nodes().iter().zip(&families).enumerate() {
+        let mut own = count(i, node, family, &table_cells);
+        if let Some(earlier) = earlier.and_then(|earlier| earlier.nodes.get(&node.name)) {
+            for (own, earlier) in own.iter_mut().flatten().zip(earlier.counts.iter().flatten()) {
+                *own += earlier;
+            }
+        }
         if let NodeKind::Discrete { states, .. } = &node.kind {
-            let unseen = (0..states.len()).filter(|&state| counts.iter().all(|row| row[state] == 0.0));
+            let unseen = (0..states.len()).filter(|&state| own.iter().all(|row| row[state] == 0.0));
             let unseen: Vec<&str> = unseen.map(|state| states[state].as_str()).collect();
             if !unseen.is_empty() {
                 warnings.push(format!("`{}`: no row has {}", node.name, list(unseen)));
             }
         }
+        counts.push(own);
     }
     let gaps = fit_gaps(network, &table_cells, &tasks, &mut fitted, &mut counts, options);
     if let Some(gaps) = &gaps {
-        if gaps.left_out > 0 {
-            warnings.push(format!(
-                "{} of {} rows with gaps have too many combinations; only their complete families were learned from",
-                gaps.left_out, gaps.n_rows
-            ));
-        }
-        if !gaps.converged {
-            warnings.push(format!(
-                "EM over the rows with gaps ended after {} steps without settling",
-                gaps.steps
-            ));
-        }
+        warnings.extend(gaps.warnings());
     }
+    let n_rows = table.n_rows() + earlier.map_or(0, |earlier| earlier.n_rows);
+    let n_rows_chosen = earlier.map_or(n_rows, |earlier| earlier.n_rows_chosen);
+    if n_rows >= 2 * n_rows_chosen && network.nodes().iter().any(chooses_components) {
+        warnings.push(format!(
+            "the numbers of components were chosen with {n_rows_chosen} rows and there are {n_rows} now; \
+             training anew may find more"
+        ));
+    }
+    let mut statistics = Statistics {
+        network: network.to_toml(),
+        group: options
+            .group
+            .clone()
+            .or_else(|| network.group().map(String::from)),
+        n_rows,
+        n_rows_chosen,
+        nodes: std::collections::BTreeMap::new(),
+    };
     let mut nodes = Vec::with_capacity(families.len());
     let mut reports = Vec::with_capacity(families.len());
     for (i, (node, family)) in network.nodes().iter().zip(&families).enumerate() {
@@ -169,36 +249,41 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
             cells: name_cells(network, node, &cells),
         };
         for (cell, fit) in report.cells.iter().zip(&cells) {
-            let place = if cell.configuration.is_empty() {
-                String::new()
-            } else {
-                cell.label()
-            };
-            warnings.extend(
-                fit.warnings
-                    .iter()
-                    .map(|warning| format!("`{}`{place}: {warning}", node.name)),
-            );
+            let place = cell.place();
+            let of_node = |warning: &String| format!("`{}`{place}: {warning}", node.name);
+            warnings.extend(fit.warnings.iter().map(of_node));
         }
+        let mut kept = NodeStatistics::default();
         let cpd = match &node.kind {
-            NodeKind::Discrete { states, prior } => Cpd::Discrete(DiscreteCpd {
-                states: states.clone(),
-                parents: discrete_parents(network, node),
-                table: counts[i]
-                    .iter()
-                    .map(|row| log_table(row, *prior).into_iter().map(f64::exp).collect())
-                    .collect(),
-            }),
+            NodeKind::Discrete { states, prior } => {
+                kept.counts.clone_from(&counts[i]);
+                Cpd::Discrete(DiscreteCpd {
+                    states: states.clone(),
+                    parents: discrete_parents(network, node),
+                    table: counts[i]
+                        .iter()
+                        .map(|row| log_table(row, *prior).into_iter().map(f64::exp).collect())
+                        .collect(),
+                })
+            }
             NodeKind::VonMisesFisher(spec) => {
+                let before = earlier.and_then(|earlier| earlier.nodes.get(&node.name));
+                let before = before.map(|node| node.directions.as_slice());
                 let weights = &table_cells.weights;
-                let trained = train_directions(network, node, spec, table, weights, options)?;
+                let trained = train_directions(network, node, spec, table, weights, options, before)?;
                 report.n_rows = trained.n_rows;
                 report.cells = trained.cells;
+                kept.directions = trained.sums;
                 warnings.extend(trained.warnings);
                 Cpd::VonMisesFisher(trained.cpd)
             }
-            NodeKind::Mixture(spec) => Cpd::Mixture(assemble(network, i, spec, &table_cells, family, &cells)),
+            NodeKind::Mixture(spec) => {
+                kept = NodeStatistics::of_mixture(i, &table_cells, &tasks, &fitted);
+                let parts = cells.iter().map(|cell| &cell.mixing).collect::<Vec<_>>();
+                Cpd::Mixture(assemble(network, i, spec, &table_cells.scaling, &parts))
+            }
         };
+        statistics.nodes.insert(node.name.clone(), kept);
         let mut extra = Map::new();
         extra.insert(
             "training".into(),
@@ -214,16 +299,20 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
     let provenance = json!({
         "program": concat!("prehend-model ", env!("CARGO_PKG_VERSION")),
         "seed": options.seed,
-        "n_rows": table.n_rows(),
+        "n_rows": n_rows,
         "restarts": options.restarts,
-        "group": options.group.as_deref().or(network.group()),
+        "group": statistics.group,
         "warnings": warnings,
     });
-    let model = Model::new(nodes, Map::from_iter([("provenance".to_string(), provenance)]))?;
+    let extra = [
+        ("provenance".to_string(), provenance),
+        (statistics::KEY.to_string(), json!(statistics)),
+    ];
+    let model = Model::new(nodes, Map::from_iter(extra))?;
     let log_likelihood = model.log_likelihood(table)?.iter().sum();
     let n_parameters = model.n_parameters();
     let report = TrainReport {
-        n_rows: table.n_rows(),
+        n_rows,
         log_likelihood,
         n_parameters,
         nodes: reports,
@@ -231,6 +320,15 @@ pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result
         warnings,
     };
     Ok(Trained { model, report })
+}
+
+/// Whether the number of components is chosen by the data.
+fn chooses_components(node: &NodeSpec) -> bool {
+    match &node.kind {
+        NodeKind::Discrete { .. } => false,
+        NodeKind::Mixture(spec) => matches!(spec.order, MixtureOrder::Bic { .. }),
+        NodeKind::VonMisesFisher(spec) => matches!(spec.order, MixtureOrder::Bic { .. }),
+    }
 }
 
 fn check_weights(table: &Table, options: &TrainOptions) -> Result<Vec<f64>, ModelError> {
@@ -256,112 +354,6 @@ fn check_weights(table: &Table, options: &TrainOptions) -> Result<Vec<f64>, Mode
     }
 }
 
-/// A number for each row, equal where the rows belong together. Rows without a group stand alone.
-pub(crate) fn read_groups(
-    network: &Network,
-    table: &Table,
-    group: Option<&str>,
-    warnings: &mut Vec<String>,
-) -> Result<Option<Vec<usize>>, ModelError> {
-    let column = match (group, network.group()) {
-        (Some(column), _) => column,
-        (None, Some(column)) => {
-            if table.column(column).is_none() {
-                warnings.push(format!(
-                    "the network's group column `{column}` is not in the table; values that repeat within a group \
-                     count as if each row had measured them anew"
-                ));
-                return Ok(None);
-            }
-            column
-        }
-        (None, None) => return Ok(None),
-    };
-    let mut known = std::collections::BTreeMap::new();
-    let cells = table.texts(column, "grouping")?;
-    let mut next = 0;
-    Ok(Some(
-        cells
-            .into_iter()
-            .map(|cell| {
-                let group = match cell {
-                    Some(text) => *known.entry(text).or_insert(next),
-                    None => next,
-                };
-                next = next.max(group + 1);
-                group
-            })
-            .collect(),
-    ))
-}
-
-/// One task per configuration, or a single one where the components are shared.
-fn cell_tasks<'a>(
-    node: usize,
-    spec: &'a MixtureSpec,
-    cells: &'a Cells,
-    family: &'a Family,
-    options: &TrainOptions,
-    grouped: bool,
-) -> Vec<CellTask<'a>> {
-    let together = spec.weights != Weights::PerConfiguration || spec.shared_covariance;
-    let configurations: Vec<Option<usize>> = if together && family.ends.len() > 1 {
-        vec![None]
-    } else {
-        (0..family.ends.len()).map(Some).collect()
-    };
-    configurations
-        .into_iter()
-        .map(|cell| CellTask {
-            node,
-            cell,
-            spec,
-            cells,
-            family,
-            options: options.clone(),
-            grouped,
-        })
-        .collect()
-}
-
-/// The cells' reports with the states of the parents in them.
-fn name_cells(network: &Network, node: &NodeSpec, cells: &[&FittedCell]) -> Vec<CellReport> {
-    let parents: Vec<(&str, &[String])> = node
-        .parents
-        .iter()
-        .filter_map(|&parent| match &network.nodes()[parent].kind {
-            NodeKind::Discrete { states, .. } => {
-                Some((network.nodes()[parent].name.as_str(), states.as_slice()))
-            }
-            NodeKind::Mixture(_) | NodeKind::VonMisesFisher(_) => None,
-        })
-        .collect();
-    cells
-        .iter()
-        .map(|cell| {
-            let mut report = cell.report.clone();
-            if let Some(mut row) = cell.cell {
-                for (name, states) in parents.iter().rev() {
-                    report
-                        .configuration
-                        .insert(0, ((*name).into(), states[row % states.len()].clone()));
-                    row /= states.len();
-                }
-            }
-            report
-        })
-        .collect()
-}
-
-fn discrete_parents(network: &Network, node: &NodeSpec) -> Vec<NodeIdx> {
-    let is_discrete = |&&parent: &&usize| matches!(network.nodes()[parent].kind, NodeKind::Discrete { .. });
-    node.parents
-        .iter()
-        .filter(is_discrete)
-        .map(|&parent| NodeIdx(parent))
-        .collect()
-}
-
 /// Weight of each state under each configuration, over the rows where both are known; nothing for a continuous node.
 fn count(position: usize, node: &NodeSpec, family: &Family, cells: &Cells) -> Vec<Vec<f64>> {
     let NodeKind::Discrete { states, .. } = &node.kind else {
@@ -376,71 +368,6 @@ fn count(position: usize, node: &NodeSpec, family: &Family, cells: &Cells) -> Ve
         }
     }
     counts
-}
-
-/// Turns standardised regressions back into the columns' units.
-fn assemble(
-    network: &Network,
-    position: usize,
-    spec: &MixtureSpec,
-    table_cells: &Cells,
-    family: &Family,
-    cells: &[&FittedCell],
-) -> MixtureCpd {
-    let node = &network.nodes()[position];
-    let unit = &table_cells.scaling[position];
-    let parent_unit = table_cells.parent_scaling(network, position);
-    let (d, q) = (spec.columns.len(), parent_unit.mean.len());
-    let mut components = Vec::with_capacity(family.ends.len());
-    for configuration in 0..family.ends.len() {
-        // Configurations that share something come from one cell.
-        let (cell, row) = match cells {
-            [all] => (*all, configuration),
-            each => (each[configuration], 0),
-        };
-        let weights: Vec<f64> = cell.mixing.log_weights[row]
-            .iter()
-            .map(|log_weight| log_weight.exp())
-            .collect();
-        let total: f64 = weights.iter().sum();
-        let parts = cell.mixing.set(row).iter().zip(weights).map(|(part, weight)| {
-            let coefficients = nalgebra::DMatrix::from_fn(d, q, |i, j| {
-                part.slopes[(i, j + 1)] * unit.standard_deviation[i] / parent_unit.standard_deviation[j]
-            });
-            let mean = nalgebra::DVector::from_fn(d, |i, _| {
-                let pulled: f64 = (0..q).map(|j| coefficients[(i, j)] * parent_unit.mean[j]).sum();
-                unit.mean[i] + unit.standard_deviation[i] * part.slopes[(i, 0)] - pulled
-            });
-            let covariance = nalgebra::DMatrix::from_fn(d, d, |i, j| {
-                part.covariance[(i, j)] * unit.standard_deviation[i] * unit.standard_deviation[j]
-            });
-            Component {
-                weight: weight / total,
-                mean,
-                coefficients,
-                covariance,
-            }
-        });
-        components.push(parts.collect());
-    }
-    MixtureCpd {
-        columns: spec.columns.clone(),
-        discrete_parents: discrete_parents(network, node),
-        continuous_parents: node
-            .parents
-            .iter()
-            .filter(|&&parent| matches!(network.nodes()[parent].kind, NodeKind::Mixture(_)))
-            .map(|&parent| NodeIdx(parent))
-            .collect(),
-        components,
-        weights: spec.weights,
-        sign: spec.sign,
-        sphere: spec.sphere,
-        scaling: Some(Scaling {
-            mean: unit.mean.clone(),
-            standard_deviation: unit.standard_deviation.clone(),
-        }),
-    }
 }
 
 impl NodeReport {

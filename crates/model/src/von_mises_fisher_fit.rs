@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::bessel::bessel_ratio;
 use crate::gaussian::log_sum_exp;
+use crate::statistics::DirectionSum;
 use crate::von_mises_fisher::{VonMisesFisher, log_mixture, log_normalizer, n_direction_parameters};
 
 /// Concentration below which a component is as good as uniform.
@@ -25,6 +26,8 @@ pub(crate) struct Directions {
     pub d: usize,
     pub x: Vec<Vec<f64>>,
     pub weights: Vec<f64>,
+    /// Of each component, over rows that are no longer here; empty for none.
+    pub earlier: Vec<DirectionSum>,
 }
 
 /// How directions are fitted.
@@ -49,8 +52,25 @@ pub(crate) struct DirectionFit {
 }
 
 impl Directions {
+    /// Weight of all rows, earlier ones included.
     pub fn total(&self) -> f64 {
-        self.weights.iter().sum()
+        let earlier = self.earlier.iter().map(|part| part.mass);
+        self.weights.iter().copied().chain(earlier).sum()
+    }
+
+    /// Goes on from the earlier rows with their number of components, or with one.
+    pub fn go_on(&self, one: bool, options: DirectionOptions) -> DirectionFit {
+        let k = if one { 1 } else { self.earlier.len().max(1) };
+        if k == 1 {
+            return self.run(vec![vec![1.0]; self.x.len()], 1, options);
+        }
+        let start = self.maximize(&vec![vec![0.0; k]; self.x.len()], k, options.most);
+        self.run(self.expect(&start).0, k, options)
+    }
+
+    /// Σ r and Σ r x of each component, earlier rows included.
+    pub fn sums(&self, components: &[VonMisesFisher]) -> Vec<DirectionSum> {
+        self.gather(&self.expect(components).0, components.len())
     }
 
     /// −2 log L + parameters · log n.
@@ -89,7 +109,7 @@ impl Directions {
         for restart in 0..restarts {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream((k * 1024 + restart) as u64);
-            let fit = self.run(self.cluster(k, &mut rng), options);
+            let fit = self.run(self.cluster(k, &mut rng), k, options);
             if best
                 .as_ref()
                 .is_none_or(|best| fit.log_likelihood > best.log_likelihood)
@@ -108,7 +128,7 @@ impl Directions {
                 component.weight /= total;
             }
             let responsibilities = self.expect(&fit.components).0;
-            fit = self.run(responsibilities, options);
+            fit = self.run(responsibilities, fit.components.len(), options);
         }
         fit
     }
@@ -120,14 +140,14 @@ impl Directions {
             .min_by(|&a, &b| fit.components[a].weight.total_cmp(&fit.components[b].weight))
     }
 
-    fn run(&self, start: Vec<Vec<f64>>, options: DirectionOptions) -> DirectionFit {
+    fn run(&self, start: Vec<Vec<f64>>, k: usize, options: DirectionOptions) -> DirectionFit {
         let enough = options.tolerance * self.total();
-        let mut components = self.maximize(&start, options.most);
+        let mut components = self.maximize(&start, k, options.most);
         let (mut responsibilities, mut log_likelihood) = self.expect(&components);
         let mut objectives = vec![log_likelihood];
         let mut converged = components.len() == 1;
         while !converged && objectives.len() <= options.max_steps {
-            components = self.maximize(&responsibilities, options.most);
+            components = self.maximize(&responsibilities, k, options.most);
             let last = log_likelihood;
             (responsibilities, log_likelihood) = self.expect(&components);
             objectives.push(log_likelihood);
@@ -172,23 +192,45 @@ impl Directions {
                 row
             })
             .collect();
+        // Earlier rows stay with their components: |x − μ|² = 2 − 2 μ·x.
+        for ((part, component), constant) in self.earlier.iter().zip(components).zip(&constants) {
+            let along: f64 = component
+                .direction
+                .iter()
+                .zip(&part.sum)
+                .map(|(a, b)| a * b)
+                .sum();
+            log_likelihood += part.mass * constant - component.concentration * (part.mass - along);
+        }
         (responsibilities, log_likelihood)
     }
 
-    fn maximize(&self, responsibilities: &[Vec<f64>], most: f64) -> Vec<VonMisesFisher> {
-        let k = responsibilities.first().map_or(1, Vec::len);
-        let total = self.total();
+    fn gather(&self, responsibilities: &[Vec<f64>], k: usize) -> Vec<DirectionSum> {
         (0..k)
             .map(|c| {
-                let mut mass = 0.0;
-                let mut sum = DVector::<f64>::zeros(self.d);
+                let mut part = if k == self.earlier.len() {
+                    self.earlier[c].clone()
+                } else {
+                    DirectionSum::together(self.d, self.earlier.iter().filter(|_| c == 0))
+                };
                 for ((x, weight), row) in self.x.iter().zip(&self.weights).zip(responsibilities) {
                     let share = weight * row[c];
-                    mass += share;
-                    for (sum, x) in sum.iter_mut().zip(x) {
+                    part.mass += share;
+                    for (sum, x) in part.sum.iter_mut().zip(x) {
                         *sum += share * x;
                     }
                 }
+                part
+            })
+            .collect()
+    }
+
+    fn maximize(&self, responsibilities: &[Vec<f64>], k: usize, most: f64) -> Vec<VonMisesFisher> {
+        let total = self.total();
+        self.gather(responsibilities, k)
+            .into_iter()
+            .map(|DirectionSum { mass, sum }| {
+                let sum = DVector::from_vec(sum);
                 let length = sum.norm();
                 // No rows, or rows that cancel: uniform, whatever the direction.
                 if mass <= 0.0 || length <= 1e-12 * mass {
@@ -329,6 +371,7 @@ mod tests {
             d: 3,
             weights: vec![1.0; x.len()],
             x,
+            earlier: vec![],
         };
         let (fits, best) = rows.fit_by_bic(4, OPTIONS, 1);
         assert_eq!(fits[best].components.len(), 2);
@@ -354,6 +397,7 @@ mod tests {
             d: 3,
             x: vec![vec![1.0, 0.0, 0.0]; 20],
             weights: vec![1.0; 20],
+            earlier: vec![],
         };
         assert_eq!(
             same.fit(1, OPTIONS, 0).components[0].concentration,
@@ -365,6 +409,7 @@ mod tests {
                 .map(|i| vec![if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0])
                 .collect(),
             weights: vec![1.0; 20],
+            earlier: vec![],
         };
         let one = opposite.fit(1, OPTIONS, 0);
         assert_eq!(one.components[0].concentration, 0.0);

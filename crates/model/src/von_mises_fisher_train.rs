@@ -5,6 +5,7 @@ use crate::cpd::NodeIdx;
 use crate::error::ModelError;
 use crate::evidence::unit_vector;
 use crate::network::{MixtureOrder, Network, NodeKind, NodeSpec, VonMisesFisherSpec};
+use crate::statistics::DirectionSum;
 use crate::table::Table;
 use crate::train::TrainOptions;
 use crate::von_mises_fisher::{MAX_CONCENTRATION, VonMisesFisherCpd, n_direction_parameters};
@@ -15,6 +16,8 @@ pub(crate) struct TrainedDirections {
     pub cpd: VonMisesFisherCpd,
     pub cells: Vec<CellReport>,
     pub n_rows: usize,
+    /// Of each cell and component.
+    pub sums: Vec<Vec<DirectionSum>>,
     pub warnings: Vec<String>,
 }
 
@@ -62,7 +65,7 @@ pub(crate) fn direction_options(
     }
 }
 
-/// Fits one node.
+/// Fits one node. `earlier` are the sums of rows that are no longer here, with which it goes on.
 pub(crate) fn train_directions(
     network: &Network,
     node: &NodeSpec,
@@ -70,6 +73,7 @@ pub(crate) fn train_directions(
     table: &Table,
     weights: &[f64],
     options: &TrainOptions,
+    earlier: Option<&[Vec<DirectionSum>]>,
 ) -> Result<TrainedDirections, ModelError> {
     let values = read_directions(spec, &node.name, table)?;
     let mut configurations = vec![Some(0); table.n_rows()];
@@ -102,6 +106,11 @@ pub(crate) fn train_directions(
             d,
             x: Vec::new(),
             weights: Vec::new(),
+            earlier: match (earlier, cell) {
+                (None, _) => Vec::new(),
+                (Some(earlier), Some(cell)) => earlier[cell].clone(),
+                (Some(earlier), None) => vec![DirectionSum::together(d, earlier.iter().flatten())],
+            },
         };
         for ((value, configuration), weight) in values.iter().zip(&configurations).zip(weights) {
             if let (Some(value), Some(configuration)) = (value, configuration)
@@ -115,7 +124,7 @@ pub(crate) fn train_directions(
         rows
     };
     let all = gather(None);
-    if all.x.is_empty() {
+    if all.x.is_empty() && earlier.is_none() {
         return Err(ModelError::NoRows {
             node: node.name.clone(),
             n_rows: table.n_rows(),
@@ -130,6 +139,7 @@ pub(crate) fn train_directions(
         },
         cells: Vec::with_capacity(labels.len()),
         n_rows: all.x.len(),
+        sums: Vec::with_capacity(labels.len()),
         warnings: Vec::new(),
     };
     for (cell, configuration) in labels.into_iter().enumerate() {
@@ -140,6 +150,7 @@ pub(crate) fn train_directions(
         // Every cell has a stream of its own, whatever the others do.
         let seed = options.seed ^ (cell as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         let (fits, best) = match spec.order {
+            _ if earlier.is_some() => (vec![rows.go_on(pooled, fit_options)], 0),
             _ if pooled => (vec![rows.fit(1, fit_options, seed)], 0),
             MixtureOrder::Fixed(k) => {
                 let carried = (rows.total() / (d + 1) as f64) as usize;
@@ -178,11 +189,7 @@ pub(crate) fn train_directions(
             pooled,
             objectives: fit.objectives.clone(),
         };
-        let place = if report.configuration.is_empty() {
-            String::new()
-        } else {
-            report.label()
-        };
+        let place = report.place();
         if pooled {
             out.warnings.push(format!(
                 "`{}`{place}: {n_rows} rows are too few; took one component over all configurations",
@@ -196,6 +203,11 @@ pub(crate) fn train_directions(
                 node.name
             ));
         }
+        out.sums.push(own.sums(if pooled {
+            &fit.components[..1]
+        } else {
+            &fit.components
+        }));
         out.cpd.components.push(fit.components.clone());
         out.cells.push(report);
     }

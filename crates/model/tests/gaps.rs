@@ -1,49 +1,12 @@
 //! Training on tables with gaps, and what configurations may share.
 
-use prehend_model::{Column, Cpd, Model, Network, Table, TrainOptions, Trained, train};
+mod common;
 
-const TRUTH: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
-  { "name": "task", "kind": "discrete", "states": ["a", "b"], "parents": [], "table": [[0.4, 0.6]] },
-  { "name": "size", "kind": "gaussian_mixture", "columns": ["size_x", "size_y"], "discrete_parents": ["task"],
-    "continuous_parents": [], "components": [
-      [ {"weight": 1.0, "mean": [0.1, 0.2], "coefficients": [[], []], "covariance": [[0.01, 0.002], [0.002, 0.02]]} ],
-      [ {"weight": 0.3, "mean": [1.0, 0.0], "coefficients": [[], []], "covariance": [[0.01, 0.0], [0.0, 0.01]]},
-        {"weight": 0.7, "mean": [2.0, 1.0], "coefficients": [[], []], "covariance": [[0.05, 0.01], [0.01, 0.05]]} ] ] },
-  { "name": "grip", "kind": "gaussian_mixture", "discrete_parents": ["task"], "continuous_parents": ["size"],
-    "components": [
-      [ {"weight": 0.5, "mean": [0.0], "coefficients": [[3.0, 0.0]], "covariance": [[0.01]]},
-        {"weight": 0.5, "mean": [0.0], "coefficients": [[-3.0, 1.0]], "covariance": [[0.01]]} ],
-      [ {"weight": 1.0, "mean": [1.0], "coefficients": [[0.5, 0.5]], "covariance": [[0.04]]} ] ] } ] }"#;
+use common::{fit, held_out, network, truth};
+use prehend_model::{Column, Cpd, Table};
 
-const NETWORK: &str = r#"
-[[node]]
-name = "task"
-kind = "discrete"
-states = ["a", "b"]
-[[node]]
-name = "size"
-kind = "gaussian_mixture"
-columns = ["size_x", "size_y"]
-parents = ["task"]
-mixture = { components = 2 }
-[[node]]
-name = "grip"
-kind = "gaussian_mixture"
-parents = ["task", "size"]
-mixture = { components = 2 }
-"#;
-
-fn fit(network: &str, table: &Table) -> Trained {
-    train(
-        &Network::from_toml(network).unwrap(),
-        table,
-        &TrainOptions::default(),
-    )
-    .unwrap()
-}
-
-fn truth() -> Model {
-    Model::from_json(TRUTH).unwrap()
+fn two() -> String {
+    network("components = 2")
 }
 
 /// Every fifth cell empty, by a fixed rule that knows nothing of the values.
@@ -71,19 +34,10 @@ fn with_gaps(table: &Table) -> Table {
     out
 }
 
-fn held_out(model: &Model) -> f64 {
-    model
-        .log_likelihood(&truth().sample(2000, 2))
-        .unwrap()
-        .iter()
-        .sum::<f64>()
-        / 2000.0
-}
-
 #[test]
 fn a_fifth_of_the_cells_missing_costs_little() {
     let table = truth().sample(1500, 1);
-    let (whole, gaps) = (fit(NETWORK, &table), fit(NETWORK, &with_gaps(&table)));
+    let (whole, gaps) = (fit(&two(), &table), fit(&two(), &with_gaps(&table)));
     let lost = held_out(&whole.model) - held_out(&gaps.model);
     assert!(lost < 0.05, "gaps cost {lost} nats a row");
     let report = gaps.report.gaps.unwrap();
@@ -94,7 +48,7 @@ fn a_fifth_of_the_cells_missing_costs_little() {
 #[test]
 fn the_objective_never_falls_with_gaps_and_is_the_likelihood_of_what_is_known() {
     let table = with_gaps(&truth().sample(400, 3));
-    let trained = fit(NETWORK, &table);
+    let trained = fit(&two(), &table);
     let objectives = trained.report.gaps.unwrap().objectives;
     assert!(objectives.len() > 3);
     prehend_testkit::never_falls(&objectives);
@@ -128,7 +82,7 @@ fn labels_that_are_missing_are_learned_from_and_rows_without_one_whole_family_su
             .map(|(i, v)| if i % 3 == k { f64::NAN } else { *v });
         gaps = gaps.with_numbers(name, values.collect()).unwrap();
     }
-    let trained = fit(&NETWORK.replace("components = 2", "components = 1"), &gaps);
+    let trained = fit(&two().replace("components = 2", "components = 1"), &gaps);
     assert!(
         trained
             .report
@@ -136,14 +90,14 @@ fn labels_that_are_missing_are_learned_from_and_rows_without_one_whole_family_su
             .iter()
             .any(|w| w.contains("gaps filled by the columns' means"))
     );
-    let whole = fit(&NETWORK.replace("components = 2", "components = 1"), &table);
+    let whole = fit(&two().replace("components = 2", "components = 1"), &table);
     let lost = held_out(&whole.model) - held_out(&trained.model);
     assert!(lost < 0.3, "lost {lost} nats a row");
 }
 
 #[test]
 fn root_weights_are_the_same_in_all_configurations() {
-    let root = NETWORK.replace(
+    let root = two().replace(
         "mixture = { components = 2 }",
         "mixture = { components = 2, weights = \"root\" }",
     );
@@ -166,7 +120,7 @@ fn root_weights_are_the_same_in_all_configurations() {
 
 #[test]
 fn a_shared_covariance_is_one_for_all_components() {
-    let shared = NETWORK.replace("components = 2 }", "components = 2 }\ncovariance = \"shared\"");
+    let shared = two().replace("components = 2 }", "components = 2 }\ncovariance = \"shared\"");
     let trained = fit(&shared, &truth().sample(1000, 9));
     for node in &trained.model.nodes()[1..] {
         let Cpd::Mixture(cpd) = &node.cpd else {
@@ -179,30 +133,4 @@ fn a_shared_covariance_is_one_for_all_components() {
     for cell in trained.report.nodes.iter().flat_map(|node| &node.cells) {
         prehend_testkit::never_falls(&cell.objectives);
     }
-}
-
-#[test]
-fn the_order_of_rows_does_not_matter_and_a_weight_of_two_is_a_row_twice() {
-    let table = truth().sample(300, 11);
-    let backwards: Vec<usize> = (0..300).rev().collect();
-    let forwards: Vec<usize> = (0..300).collect();
-    let one = NETWORK.replace("components = 2", "components = 1");
-    let same = |a: &Model, b: &Model| {
-        let (a, b) = (held_out(a), held_out(b));
-        assert!((a - b).abs() < 1e-9, "{a} and {b}");
-    };
-    same(
-        &fit(&one, &table).model,
-        &fit(&one, &table.select(&backwards)).model,
-    );
-    let twice = table.select(&[&forwards[..], &forwards[..100]].concat());
-    let weights: Vec<f64> = (0..300).map(|i| if i < 100 { 2.0 } else { 1.0 }).collect();
-    let options = TrainOptions {
-        weights: Some(weights),
-        ..TrainOptions::default()
-    };
-    let weighted = train(&Network::from_toml(&one).unwrap(), &table, &options).unwrap();
-    let (a, b) = (held_out(&weighted.model), held_out(&fit(&one, &twice).model));
-    // Uneven weights count for fewer independent rows, which the priors alone notice.
-    assert!((a - b).abs() < 1e-2, "{a} and {b}");
 }

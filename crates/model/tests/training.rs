@@ -1,51 +1,22 @@
 //! Training: recovery, monotone EM, the guard against a component per object, and rows that do not fit.
 
-use prehend_model::{Evidence, Model, Network, Table, TrainOptions, Trained, train};
+mod common;
 
-/// A hand-written model of two tasks, a bimodal size per task and a child that regresses on it.
-const TRUTH: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
-  { "name": "task", "kind": "discrete", "states": ["a", "b"], "parents": [], "table": [[0.4, 0.6]] },
-  { "name": "size", "kind": "gaussian_mixture", "columns": ["size_x", "size_y"], "discrete_parents": ["task"],
-    "continuous_parents": [], "components": [
-      [ {"weight": 1.0, "mean": [0.1, 0.2], "coefficients": [[], []], "covariance": [[0.01, 0.002], [0.002, 0.02]]} ],
-      [ {"weight": 0.3, "mean": [1.0, 0.0], "coefficients": [[], []], "covariance": [[0.01, 0.0], [0.0, 0.01]]},
-        {"weight": 0.7, "mean": [2.0, 1.0], "coefficients": [[], []], "covariance": [[0.05, 0.01], [0.01, 0.05]]} ] ] },
-  { "name": "grip", "kind": "gaussian_mixture", "discrete_parents": ["task"], "continuous_parents": ["size"],
-    "components": [
-      [ {"weight": 0.5, "mean": [0.0], "coefficients": [[3.0, 0.0]], "covariance": [[0.01]]},
-        {"weight": 0.5, "mean": [0.0], "coefficients": [[-3.0, 1.0]], "covariance": [[0.01]]} ],
-      [ {"weight": 1.0, "mean": [1.0], "coefficients": [[0.5, 0.5]], "covariance": [[0.04]]} ] ] } ] }"#;
+use common::{fit, held_out, network, truth};
+use prehend_model::{Evidence, Network, Table, TrainOptions, Trained, train};
 
-const NETWORK: &str = r#"
-[[node]]
-name = "task"
-kind = "discrete"
-states = ["a", "b"]
-[[node]]
-name = "size"
-kind = "gaussian_mixture"
-columns = ["size_x", "size_y"]
-parents = ["task"]
-mixture = { max = 5, choose = "bic" }
-[[node]]
-name = "grip"
-kind = "gaussian_mixture"
-parents = ["task", "size"]
-mixture = { max = 5, choose = "bic" }
-"#;
+/// Up to five components, by BIC.
+fn by_bic() -> String {
+    network("max = 5, choose = \"bic\"")
+}
 
 fn trained(table: &Table) -> Trained {
-    train(
-        &Network::from_toml(NETWORK).unwrap(),
-        table,
-        &TrainOptions::default(),
-    )
-    .unwrap()
+    fit(&by_bic(), table)
 }
 
 #[test]
 fn samples_give_back_the_model_they_came_from() {
-    let truth = Model::from_json(TRUTH).unwrap();
+    let truth = truth();
     let table = truth.sample(4000, 1);
     let Trained { model, report } = trained(&table);
     let components: Vec<Vec<usize>> = report
@@ -54,16 +25,14 @@ fn samples_give_back_the_model_they_came_from() {
         .map(prehend_model::NodeReport::components)
         .collect();
     assert_eq!(components, [vec![], vec![1, 2], vec![2, 1]]);
-    let held_out = truth.sample(2000, 2);
-    let mean = |model: &Model| model.log_likelihood(&held_out).unwrap().iter().sum::<f64>() / 2000.0;
-    let lost = mean(&truth) - mean(&model);
+    let lost = held_out(&truth) - held_out(&model);
     assert!(lost.abs() < 0.02, "the trained model loses {lost} nats a row");
     assert!(report.warnings.is_empty(), "{:?}", report.warnings);
 }
 
 #[test]
 fn the_objective_never_falls_during_em() {
-    let table = Model::from_json(TRUTH).unwrap().sample(500, 3);
+    let table = truth().sample(500, 3);
     let report = trained(&table).report;
     let mut n_steps = 0;
     for cell in report.nodes.iter().flat_map(|node| &node.cells) {
@@ -82,7 +51,7 @@ fn the_objective_never_falls_during_em() {
 
 #[test]
 fn the_same_seed_gives_the_same_bytes_for_any_number_of_threads() {
-    let table = Model::from_json(TRUTH).unwrap().sample(600, 4);
+    let table = truth().sample(600, 4);
     let run = |n_threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(n_threads)
@@ -95,9 +64,9 @@ fn the_same_seed_gives_the_same_bytes_for_any_number_of_threads() {
 
 /// Twelve objects with one size each and fifty grasps on each of them.
 fn repeated() -> Table {
-    let sizes = Model::from_json(TRUTH).unwrap().sample(12, 5);
+    let sizes = truth().sample(12, 5);
     let rows: Vec<usize> = (0..600).map(|row| row / 50).collect();
-    let grips = Model::from_json(TRUTH).unwrap().sample(600, 6);
+    let grips = truth().sample(600, 6);
     let prehend_model::Column::Numbers(grip) = grips.column("grip").unwrap().clone() else {
         panic!("numbers")
     };
@@ -115,7 +84,7 @@ fn repeated() -> Table {
 
 #[test]
 fn a_node_that_is_constant_within_objects_gets_no_component_per_object() {
-    let network = Network::from_toml(&format!("group = \"object\"\n{NETWORK}")).unwrap();
+    let network = Network::from_toml(&format!("group = \"object\"\n{}", by_bic())).unwrap();
     let report = train(&network, &repeated(), &TrainOptions::default())
         .unwrap()
         .report;
@@ -138,12 +107,12 @@ fn a_node_that_is_constant_within_objects_gets_no_component_per_object() {
 
 #[test]
 fn cross_validation_over_objects_never_takes_more_components_than_bic() {
-    let guarded = NETWORK.replace("\"bic\"", "\"bic+cv\"");
+    let guarded = by_bic().replace("\"bic\"", "\"bic+cv\"");
     let network = Network::from_toml(&format!("group = \"object\"\n{guarded}")).unwrap();
     let report = train(&network, &repeated(), &TrainOptions::default())
         .unwrap()
         .report;
-    let alone = Network::from_toml(&format!("group = \"object\"\n{NETWORK}")).unwrap();
+    let alone = Network::from_toml(&format!("group = \"object\"\n{}", by_bic())).unwrap();
     let by_bic = train(&alone, &repeated(), &TrainOptions::default())
         .unwrap()
         .report;
@@ -185,7 +154,7 @@ fn gaps_a_constant_column_one_row_and_a_task_that_never_occurs_are_survived() {
     let one = trained(&table.select(&[0]));
     assert_eq!(one.report.nodes[2].n_rows, 1);
     let none = train(
-        &Network::from_toml(NETWORK).unwrap(),
+        &Network::from_toml(&by_bic()).unwrap(),
         &table.select(&[]),
         &TrainOptions::default(),
     );
@@ -199,7 +168,7 @@ fn gaps_a_constant_column_one_row_and_a_task_that_never_occurs_are_survived() {
 fn a_missing_column_is_named() {
     let table = Table::new(1).with_numbers("size_x", vec![0.0]).unwrap();
     let error = train(
-        &Network::from_toml(NETWORK).unwrap(),
+        &Network::from_toml(&by_bic()).unwrap(),
         &table,
         &TrainOptions::default(),
     )
@@ -212,11 +181,11 @@ fn a_missing_column_is_named() {
 
 #[test]
 fn shared_components_differ_in_weights_only() {
-    let shared = NETWORK.replace(
+    let shared = by_bic().replace(
         "parents = [\"task\"]\n",
         "parents = [\"task\"]\nweights = \"shared\"\n",
     );
-    let table = Model::from_json(TRUTH).unwrap().sample(2000, 8);
+    let table = truth().sample(2000, 8);
     let trained = train(
         &Network::from_toml(&shared).unwrap(),
         &table,

@@ -107,7 +107,7 @@ impl Scorer {
         effort: FitEffort,
     ) -> Result<Self, ModelError> {
         let n = table.n_rows();
-        let cells = Cells::read(network, table, vec![1.0; n])?;
+        let cells = Cells::read(network, table, vec![1.0; n], &[])?;
         let mut nodes = Vec::with_capacity(network.nodes().len());
         for (i, node) in network.nodes().iter().enumerate() {
             let mut share = 1.0;
@@ -292,6 +292,7 @@ impl Scorer {
                 d,
                 x: kept.iter().map(|&i| x[members.rows[i]].clone()).collect(),
                 weights: kept.iter().map(|&i| members.weights[i]).collect(),
+                earlier: Vec::new(),
             }
         };
         // Rows learned from, rows scored, and what a parameter costs.
@@ -525,6 +526,7 @@ impl MixtureFamily<'_> {
             z,
             weights: cell.iter().map(|&i| members.weights[i]).collect(),
             ends,
+            earlier: Vec::new(),
         }
     }
 }
