@@ -44,8 +44,8 @@ pub(crate) struct Arrival {
 impl Approach<'_> {
     /// Travels up to `farthest`; `None` where the hand overlaps the object at the start.
     pub(crate) fn run(&self, farthest: f64) -> Option<Arrival> {
-        let mut tracks = vec![Track::apart_at(0.0); self.hand.solids.len()];
-        let touch = first_touch(self, &mut tracks, farthest).ok()?;
+        let mut tracks = vec![Track::unknown_at(0.0); self.hand.solids.len()];
+        let touch = first_touch(self, &mut tracks, 0.0, farthest).ok()?;
         Some(Arrival {
             travelled: touch.s,
             solid: touch.pair,

@@ -1,5 +1,7 @@
 //! The fingers close: each joint until a link on it touches, distal joints going on.
 
+use std::cell::RefCell;
+
 use nalgebra::Isometry3;
 use prehend_hand::JointPositions;
 
@@ -14,8 +16,6 @@ const PROBE: f64 = 5e-5;
 const PRESSING: f64 = 0.02;
 /// No joint turns or slides farther than this while closing, whatever its limits.
 const MOST_TRAVEL: f64 = std::f64::consts::TAU;
-/// Links may come this much (m) closer to each other between two looks: fingers are thicker.
-const LEAST_STEP_OF_PAIRS: f64 = 2e-3;
 /// Distances between links are looked for up to this, metres.
 const FAR: f64 = 0.05;
 /// A pair that touches this often while sliding along is stopped.
@@ -46,24 +46,26 @@ pub(crate) fn close_fingers(
     let n_solids = hand.solids.len();
     let n_pairs = n_solids + hand.pairs.len();
     let mut closing = Closing::new(hand, object, *object_from_root, preshape);
-    let mut tracks = vec![Track::apart_at(0.0); n_pairs];
+    let mut tracks = vec![Track::unknown_at(0.0); n_pairs];
     let mut touches = vec![0u32; n_pairs];
     loop {
         let end = closing.end();
         if end <= closing.s0 {
             break;
         }
-        let touch = first_touch(&closing, &mut tracks, end)?;
+        let touch = first_touch(&closing, &mut tracks, closing.s0, end)?;
+        let old_speeds = closing.speeds.clone();
         closing.move_to(touch.s);
-        let Some(i) = touch.pair else {
-            continue;
-        };
-        touches[i] += 1;
-        if touch.pressed || touches[i] > MOST_TOUCHES || closing.presses(i, touch.s) {
-            closing.stop(i);
-            tracks[i].grazing = false;
-        } else {
-            tracks[i].grazing = true;
+        if let Some(i) = touch.pair {
+            touches[i] += 1;
+            let stops = touch.pressed || touches[i] > MOST_TOUCHES || closing.presses(i, touch.s);
+            if stops {
+                closing.stop(i);
+            }
+            tracks[i].grazing = !stops;
+        }
+        for (i, track) in tracks.iter_mut().enumerate() {
+            track.go_on_from(touch.s, old_speeds[i], closing.speeds[i], closing.least_step(i));
         }
     }
     let joints = hand.hand.joint_positions_from_slice(&closing.q0);
@@ -82,8 +84,17 @@ struct Closing<'a> {
     rates: Vec<f64>,
     /// Speed bounds of solids against the object, then of pairs of solids.
     speeds: Vec<f64>,
-    /// Poses of all solids at `s0`.
-    poses0: Vec<Isometry3<f64>>,
+    /// The last pose of each link that was asked for, object frame. Looks often ask for the same s.
+    last_poses: RefCell<Vec<LastPose>>,
+    /// For each link, whether it stays where it is.
+    still: Vec<bool>,
+}
+
+/// A link's pose at `s`: infinite where the link stays, not a number where none is known.
+#[derive(Clone, Copy)]
+struct LastPose {
+    s: f64,
+    pose: Isometry3<f64>,
 }
 
 impl<'a> Closing<'a> {
@@ -103,7 +114,8 @@ impl<'a> Closing<'a> {
             q0,
             rates,
             speeds: Vec::new(),
-            poses0: Vec::new(),
+            last_poses: RefCell::new(Vec::new()),
+            still: Vec::new(),
         };
         closing.settle();
         closing
@@ -118,7 +130,17 @@ impl<'a> Closing<'a> {
             }
         }
         let hand = self.hand;
-        self.poses0 = (0..hand.solids.len()).map(|i| self.moved(i, self.s0)).collect();
+        let unknown = LastPose {
+            s: f64::NAN,
+            pose: Isometry3::identity(),
+        };
+        let last_poses = self.last_poses.get_mut();
+        last_poses.clear();
+        last_poses.resize(hand.n_links(), unknown);
+        let moves = |joint: usize| self.rates[hand.joints()[joint].leader] != 0.0;
+        self.still = (0..hand.n_links())
+            .map(|link| !hand.joints_to(link).any(moves))
+            .collect();
         self.speeds.clear();
         let rates = &self.rates;
         let speed = |shares: &Vec<(usize, f64)>| -> f64 {
@@ -161,19 +183,22 @@ impl<'a> Closing<'a> {
         (self.q0[joint] + rate * (s - self.s0)).clamp(node.lower, node.upper)
     }
 
-    fn moved(&self, solid: usize, s: f64) -> Isometry3<f64> {
+    fn pose(&self, solid: usize, s: f64) -> Isometry3<f64> {
         let solid = &self.hand.solids[solid];
-        self.object_from_root
-            * self.hand.root_from_link(solid.link, |j| self.value(j, s))
-            * solid.link_from_solid
+        self.link_pose(solid.link.0, s) * solid.link_from_solid
     }
 
-    fn pose(&self, solid: usize, s: f64) -> Isometry3<f64> {
-        if s == self.s0 {
-            self.poses0[solid]
-        } else {
-            self.moved(solid, s)
+    fn link_pose(&self, link: usize, s: f64) -> Isometry3<f64> {
+        let last = self.last_poses.borrow()[link];
+        if last.s == s || last.s == f64::INFINITY {
+            return last.pose;
         }
+        let parent = self.hand.parent(link);
+        let object_from_parent = parent.map_or(self.object_from_root, |parent| self.link_pose(parent, s));
+        let pose = object_from_parent * self.hand.parent_from(link, |joint| self.value(joint, s));
+        let s = if self.still[link] { f64::INFINITY } else { s };
+        self.last_poses.borrow_mut()[link] = LastPose { s, pose };
+        pose
     }
 
     fn move_to(&mut self, s: f64) {
@@ -254,10 +279,9 @@ impl Motion for Closing<'_> {
     }
 
     fn least_step(&self, i: usize) -> f64 {
-        if i < self.hand.solids.len() {
-            LEAST_STEP
-        } else {
-            LEAST_STEP_OF_PAIRS
+        match i.checked_sub(self.hand.solids.len()) {
+            None => LEAST_STEP,
+            Some(pair) => self.hand.pair_least_steps[pair],
         }
     }
 }

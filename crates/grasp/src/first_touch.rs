@@ -1,14 +1,14 @@
 //! When do moving bodies first touch?
 
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
 /// Two bodies touch where their gap is at most this, metres. Nothing ever ends closer than [`CLEARANCE`].
 pub(crate) const TOUCH: f64 = 1e-4;
 /// A smaller gap counts as an overlap, so that rounding in a distance cannot hide one; metres.
 pub(crate) const CLEARANCE: f64 = 1e-6;
 /// A gap larger than this need not be known exactly to choose the next step, metres.
 pub(crate) const NEAR: f64 = 2.5e-3;
-
-/// A search goes on in this many slices of s.
-const N_SLICES: u32 = 12;
 
 /// Gaps between pairs of bodies that move with one parameter s.
 pub(crate) trait Motion {
@@ -26,30 +26,73 @@ pub(crate) trait Motion {
 /// What is known of one pair.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Track {
-    /// The pair was seen apart here.
-    free: f64,
+    /// The pair was seen apart here …
+    seen: f64,
+    /// … by this or more, metres.
+    gap: f64,
     /// The next look is due here.
     due: f64,
-    /// Nothing can happen before `due`; else the pair may have met since `free`.
-    sure: bool,
     /// The pair touches, and may go on moving as long as it does not overlap.
     pub(crate) grazing: bool,
 }
 
 impl Track {
-    /// Whether the pair must be looked at to know what happens before `horizon`, where `touch` is the first touch so far.
-    fn is_open(&self, horizon: f64, touch: f64) -> bool {
-        self.due < horizon.min(touch) || (touch <= horizon && !self.sure && self.free < touch)
-    }
-
-    /// Nothing is known but that the pair is apart at `s`.
-    pub(crate) fn apart_at(s: f64) -> Self {
+    /// Nothing is known yet; the first look is due at `s`.
+    pub(crate) fn unknown_at(s: f64) -> Self {
         Self {
-            free: s,
+            seen: s,
+            gap: 0.0,
             due: s,
-            sure: true,
             grazing: false,
         }
+    }
+
+    /// Whether the pair cannot overlap at `s`.
+    fn is_apart_at(&self, s: f64, speed: f64) -> bool {
+        s == self.seen || self.gap - speed * (s - self.seen).abs() > CLEARANCE
+    }
+
+    /// The motion goes on from `s` in another way: what was seen of the old way beyond `s` no longer counts.
+    pub(crate) fn go_on_from(&mut self, s: f64, old_speed: f64, speed: f64, least_step: f64) {
+        self.gap = (self.gap - old_speed * (s - self.seen).abs()).max(0.0);
+        self.seen = s;
+        let sure_step = self.gap - TOUCH / 2.0;
+        self.due = if speed == 0.0 {
+            f64::INFINITY
+        } else if sure_step >= least_step {
+            rounded(s, sure_step / speed)
+        } else {
+            s
+        };
+    }
+}
+
+/// A little less than `s + step`, so that looks at different pairs often fall together.
+fn rounded(s: f64, step: f64) -> f64 {
+    // The largest power of two up to a quarter of the step.
+    let unit = f64::from_bits(step.to_bits() & (0x7ff << 52)) / 4.0;
+    let due = ((s + step) / unit).floor() * unit;
+    if due > s { due } else { s + step }
+}
+
+/// A look that is due; the earliest comes first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Look {
+    due: f64,
+    pair: usize,
+}
+
+impl Eq for Look {}
+
+impl Ord for Look {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.due.total_cmp(&self.due).then(other.pair.cmp(&self.pair))
+    }
+}
+
+impl PartialOrd for Look {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
 }
 
@@ -64,86 +107,89 @@ pub(crate) struct Touch {
     pub(crate) pressed: bool,
 }
 
-/// The least s up to `end` at which a pair's gap is in ([`CLEARANCE`], [`TOUCH`]]; pairs that graze must want to overlap.
+/// The least s from `start` up to `end` at which a pair's gap is in ([`CLEARANCE`], [`TOUCH`]]; pairs that graze must want
+/// to overlap. All pairs are apart there.
 ///
-/// Conservative advancement: each pair is looked at again only when it could have used up its last known gap. Near the
-/// object, where such steps would get ever smaller, pairs move at least their least step and an overlap is bisected.
+/// Conservative advancement, the earliest look first: each pair is looked at again only when it could have used up its
+/// last known gap. Near the object, where such steps would get ever smaller, pairs move at least their least step and an
+/// overlap is bisected.
 ///
 /// `Err` names a pair that overlaps at the start.
-pub(crate) fn first_touch(motion: &impl Motion, tracks: &mut [Track], end: f64) -> Result<Touch, usize> {
-    let mut touch = Touch {
-        s: end,
-        pair: None,
-        pressed: false,
+pub(crate) fn first_touch(
+    motion: &impl Motion,
+    tracks: &mut [Track],
+    start: f64,
+    end: f64,
+) -> Result<Touch, usize> {
+    let mut search = Search {
+        motion,
+        tracks,
+        start,
+        touch: Touch {
+            s: end,
+            pair: None,
+            pressed: false,
+        },
     };
-    let moving: Vec<usize> = (0..tracks.len()).filter(|i| motion.speed(*i) > 0.0).collect();
-    let start = moving.iter().map(|i| tracks[*i].free).fold(end, f64::min);
-    // In slices, so that no pair is followed far beyond what turns out to be the first touch.
-    for slice in 1..=N_SLICES {
-        let last = slice == N_SLICES;
-        let horizon = if last {
-            end
-        } else {
-            start + (end - start) * f64::from(slice) / f64::from(N_SLICES)
-        };
-        let mut settled = false;
-        while !settled {
-            settled = true;
-            for &i in &moving {
-                while tracks[i].is_open(horizon, touch.s) {
-                    settled = false;
-                    look_at(motion, i, &mut tracks[i], &mut touch)?;
-                }
-            }
-        }
-        if touch.s <= horizon {
-            break;
-        }
+    let moving: Vec<usize> = (0..search.tracks.len())
+        .filter(|i| motion.speed(*i) > 0.0)
+        .collect();
+    let of_pair = |tracks: &[Track], pair: usize| Look {
+        due: tracks[pair].due.max(start),
+        pair,
+    };
+    let mut looks: BinaryHeap<Look> = moving.iter().map(|i| of_pair(search.tracks, *i)).collect();
+    while let Some(look) = looks.pop().filter(|look| look.due < search.touch.s) {
+        search.look_at(look.pair, look.due)?;
+        looks.push(of_pair(search.tracks, look.pair));
     }
-    Ok(touch)
+    // Who may have met between two looks is looked at where the others stop.
+    let is_open =
+        |search: &Search<'_, _>, i: usize| !search.tracks[i].is_apart_at(search.touch.s, motion.speed(i));
+    while let Some(&i) = moving.iter().find(|i| is_open(&search, **i)) {
+        search.look_at(i, search.touch.s)?;
+    }
+    Ok(search.touch)
 }
 
-/// Looks at one pair where it is due, and works out what follows.
-fn look_at(motion: &impl Motion, i: usize, track: &mut Track, touch: &mut Touch) -> Result<(), usize> {
-    let s = track.due.min(touch.s);
-    let gap = motion.look(i, s);
-    if gap <= CLEARANCE {
-        if track.free >= s {
-            return Err(i);
+struct Search<'a, M> {
+    motion: &'a M,
+    tracks: &'a mut [Track],
+    start: f64,
+    /// The first touch so far.
+    touch: Touch,
+}
+
+impl<M: Motion> Search<'_, M> {
+    /// Looks at one pair, and works out what follows.
+    fn look_at(&mut self, i: usize, s: f64) -> Result<(), usize> {
+        let track = &mut self.tracks[i];
+        let gap = self.motion.look(i, s);
+        let mut at = s;
+        if gap <= CLEARANCE {
+            if s <= self.start {
+                return Err(i);
+            }
+            let free = if track.seen < s { track.seen } else { self.start };
+            at = last_free(self.motion, i, free, s);
+        } else if gap > TOUCH || track.grazing {
+            track.grazing &= gap <= TOUCH;
+            let step = (gap - TOUCH / 2.0).max(self.motion.least_step(i)) / self.motion.speed(i);
+            (track.seen, track.gap, track.due) = (s, gap, rounded(s, step));
+            return Ok(());
         }
-        let pressed = track.grazing;
-        let at = last_free(motion, i, track.free, s);
-        *touch = Touch {
+        let pressed = gap <= CLEARANCE && track.grazing;
+        self.touch = Touch {
             s: at,
             pair: Some(i),
             pressed,
         };
         *track = Track {
-            free: at,
-            due: at,
-            sure: true,
             grazing: pressed,
+            ..Track::unknown_at(at)
         };
-    } else if gap <= TOUCH && !track.grazing {
-        *touch = Touch {
-            s,
-            pair: Some(i),
-            pressed: false,
-        };
-        *track = Track {
-            free: s,
-            due: s,
-            sure: true,
-            grazing: false,
-        };
-    } else {
-        track.grazing &= gap <= TOUCH;
-        let (sure_step, least_step) = (gap - TOUCH / 2.0, motion.least_step(i));
-        track.free = s;
-        track.sure = sure_step >= least_step;
-        track.due = s + sure_step.max(least_step) / motion.speed(i);
+        Ok(())
     }
-    Ok(())
 }
 
 /// Between `free` (apart) and `overlapping`: a parameter at which the gap is within the touching range.
@@ -199,8 +245,8 @@ mod tests {
             from: vec![0.3, 0.2, 0.5, 0.1],
             speeds: vec![1.0, 1.0, 3.0, 0.0],
         };
-        let mut tracks = [Track::apart_at(0.0); 4];
-        let touch = first_touch(&line, &mut tracks, 10.0).unwrap();
+        let mut tracks = [Track::unknown_at(0.0); 4];
+        let touch = first_touch(&line, &mut tracks, 0.0, 10.0).unwrap();
         assert_eq!(touch.pair, Some(2));
         let gap = 0.5 - 3.0 * touch.s;
         assert!(gap > CLEARANCE && gap <= TOUCH, "{gap}");
@@ -212,7 +258,7 @@ mod tests {
             from: vec![0.3],
             speeds: vec![1.0],
         };
-        let touch = first_touch(&line, &mut [Track::apart_at(0.0)], 0.2).unwrap();
+        let touch = first_touch(&line, &mut [Track::unknown_at(0.0)], 0.0, 0.2).unwrap();
         assert_eq!(
             touch,
             Touch {
@@ -229,7 +275,10 @@ mod tests {
             from: vec![0.3, -0.1],
             speeds: vec![1.0, 1.0],
         };
-        assert_eq!(first_touch(&line, &mut [Track::apart_at(0.0); 2], 1.0), Err(1));
+        assert_eq!(
+            first_touch(&line, &mut [Track::unknown_at(0.0); 2], 0.0, 1.0),
+            Err(1)
+        );
     }
 
     #[test]
@@ -240,9 +289,9 @@ mod tests {
         };
         let mut tracks = [Track {
             grazing: true,
-            ..Track::apart_at(0.0)
+            ..Track::unknown_at(0.0)
         }];
-        let touch = first_touch(&line, &mut tracks, 1.0).unwrap();
+        let touch = first_touch(&line, &mut tracks, 0.0, 1.0).unwrap();
         assert!(touch.pressed && touch.pair == Some(0));
         let gap = 9e-5 - touch.s;
         assert!(gap > CLEARANCE && gap <= TOUCH);

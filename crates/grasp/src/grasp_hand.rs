@@ -1,11 +1,16 @@
 //! A hand made ready for closing: its solids, its tree of links, and how fast each can move.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use prehend_geometry::Collider;
+use prehend_geometry::{Collider, Solid};
 use prehend_hand::{Description, Hand, JointIdx, JointKind, JointPositions, LinkIdx};
 use prehend_quality::{Material, friction_coefficient, soft_torsion_default};
 
 use crate::GraspError;
+
+/// Links move towards each other by at least this (m) between two looks, if they are not much thinner …
+const LEAST_STEP: f64 = 2e-3;
+/// … and by at most this, however thick they are: fingers that are to touch must not sink in unnoticed.
+const MOST_LEAST_STEP: f64 = 6e-3;
 
 /// A hand made ready for closing.
 #[derive(Debug, Clone)]
@@ -20,6 +25,8 @@ pub(crate) struct GraspHand<'a> {
     pub(crate) pair_shares: Vec<Vec<(usize, f64)>>,
     /// Pairs of solids that may collide with each other.
     pub(crate) pairs: Vec<(usize, usize)>,
+    /// For each of them: how far (m) the two may move towards each other between two looks, less than they are thick.
+    pub(crate) pair_least_steps: Vec<f64>,
     /// Size of the palm along its y axis, metres.
     pub(crate) palm_width: f64,
 }
@@ -32,6 +39,8 @@ pub(crate) struct LinkSolid {
     pub(crate) collider: Collider,
     pub(crate) may_touch: bool,
     pub(crate) material: Material,
+    /// Length (m) that fits into the solid everywhere but near its edges.
+    thickness: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -84,6 +93,7 @@ impl<'a> GraspHand<'a> {
                     collider,
                     may_touch: description.contact_links.contains(&LinkIdx(idx)),
                     material,
+                    thickness: thickness(&placed.solid),
                 });
             }
         }
@@ -98,6 +108,7 @@ impl<'a> GraspHand<'a> {
             solid_shares: Vec::new(),
             pair_shares: Vec::new(),
             pairs: Vec::new(),
+            pair_least_steps: Vec::new(),
             palm_width: 0.0,
         };
         let reaches: Vec<_> = (0..model.solids.len())
@@ -108,6 +119,10 @@ impl<'a> GraspHand<'a> {
             for j in i + 1..model.solids.len() {
                 if !description.is_exempt(model.solids[i].link, model.solids[j].link) {
                     model.pairs.push((i, j));
+                    let thinner = model.solids[i].thickness.min(model.solids[j].thickness);
+                    model
+                        .pair_least_steps
+                        .push((thinner / 2.0).clamp(LEAST_STEP, MOST_LEAST_STEP));
                     // Joints below both move them as one.
                     let is_of = |solid: usize, joint: usize| reaches[solid].iter().any(|(k, _)| *k == joint);
                     let of_first = reaches[i].iter().filter(|(joint, _)| !is_of(j, *joint));
@@ -125,18 +140,22 @@ impl<'a> GraspHand<'a> {
         self.hand.description().expect("checked when it was made ready")
     }
 
-    /// A link's pose in the root's frame, from the value of each movable joint.
-    pub(crate) fn root_from_link(&self, link: LinkIdx, value: impl Fn(usize) -> f64) -> Isometry3<f64> {
-        let mut pose = self.parent_from(link.0, &value);
-        let mut at = self.links[link.0].parent;
-        while let Some(parent) = at {
-            pose = self.parent_from(parent, &value) * pose;
-            at = self.links[parent].parent;
-        }
-        pose
+    pub(crate) fn n_links(&self) -> usize {
+        self.links.len()
     }
 
-    fn parent_from(&self, link: usize, value: &impl Fn(usize) -> f64) -> Isometry3<f64> {
+    pub(crate) fn parent(&self, link: usize) -> Option<usize> {
+        self.links[link].parent
+    }
+
+    /// The movable joints between a link and the root.
+    pub(crate) fn joints_to(&self, link: usize) -> impl Iterator<Item = usize> {
+        let way = std::iter::successors(Some(link), |at| self.links[*at].parent);
+        way.filter_map(|at| self.links[at].joint)
+    }
+
+    /// A link's pose in its parent's frame, from the value of each movable joint.
+    pub(crate) fn parent_from(&self, link: usize, value: impl Fn(usize) -> f64) -> Isometry3<f64> {
         let node = &self.links[link];
         let Some(joint_idx) = node.joint else {
             return node.parent_from_link;
@@ -232,6 +251,16 @@ impl<'a> GraspHand<'a> {
             high = high.max(-solid.collider.lowest_along(&-Vector3::y(), &palm_from_solid));
         }
         (high - low).max(1e-3)
+    }
+}
+
+fn thickness(solid: &Solid) -> f64 {
+    match solid {
+        Solid::Sphere { radius } | Solid::Capsule { radius, .. } => 2.0 * radius,
+        Solid::Cuboid { half_extents } => 2.0 * half_extents.min(),
+        Solid::Cylinder { half_length, radius } => 2.0 * half_length.min(*radius),
+        // Nobody knows how thin it gets.
+        Solid::Hull(_) | Solid::Mesh(_) => 0.0,
     }
 }
 

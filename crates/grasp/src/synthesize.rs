@@ -211,7 +211,12 @@ fn run_try(
         match grasp {
             Ok(grasp) => return Ok(grasp),
             // The reason that counts is the first one's.
-            Err(reason) => failure = failure.or(Some(reason)),
+            Err(reason) => {
+                failure = failure.or(Some(reason));
+                if reason == Reason::NoContact {
+                    break;
+                }
+            }
         }
     }
     Err(failure.unwrap_or(Reason::NoContact))
