@@ -1,6 +1,6 @@
 //! How far a placed solid is from a surface, and where they touch.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::collider::{Collider, Core};
 use crate::core_distance::{self, core_to_triangle};
@@ -84,7 +84,15 @@ impl Surface {
         self.tree()
             .for_each_near(solid, surface_from_solid, reach, |t| triangles.push(t));
         triangles.sort_unstable();
+        if triangles.is_empty() {
+            return Vec::new();
+        }
         let corners: Vec<_> = solid.corners.iter().map(|p| surface_from_solid * p).collect();
+        let edge_bounds: Vec<_> = solid
+            .edges
+            .iter()
+            .map(|e| bounds(&e.map(|i| corners[i as usize])))
+            .collect();
         let mut found = Vec::new();
         for triangle_idx in triangles {
             let triangle = self.tree().triangle(triangle_idx);
@@ -111,15 +119,26 @@ impl Surface {
                 continue;
             }
             keep(on_core, on_surface);
+            // Most features of the solid are far from the triangle, which their bounds tell.
+            let around = bounds(triangle);
+            let local = triangle.map(|p| surface_from_solid.inverse_transform_point(&p));
             for p in &corners {
-                keep(*p, closest::on_triangle(p, triangle));
+                if are_near(&around, &(p.coords, p.coords), reach) {
+                    keep(*p, closest::on_triangle(p, triangle));
+                }
             }
-            for p in triangle {
-                if let Some(on_core) = nearest_on_core(solid, surface_from_solid, &corners, p, reach) {
+            for (p, at) in triangle.iter().zip(&local) {
+                let apart = (at.coords - solid.core_center).abs() - solid.core_half;
+                if apart.max() <= reach
+                    && let Some(on_core) = nearest_on_core(solid, surface_from_solid, &corners, p, reach)
+                {
                     keep(on_core, *p);
                 }
             }
-            for [a, b] in &solid.edges {
+            for ([a, b], bounds) in solid.edges.iter().zip(&edge_bounds) {
+                if !are_near(&around, bounds, reach) {
+                    continue;
+                }
                 for k in 0..3 {
                     let (p, q) = (&corners[*a as usize], &corners[*b as usize]);
                     let (on_core, on_surface) =
@@ -130,6 +149,20 @@ impl Surface {
         }
         found
     }
+}
+
+/// Lowest and highest coordinates of some points.
+fn bounds(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+    let first = points[0].coords;
+    let rest = points[1..].iter();
+    rest.fold((first, first), |(low, high), p| {
+        (low.inf(&p.coords), high.sup(&p.coords))
+    })
+}
+
+/// Whether two axis-aligned boxes come within `reach` along every axis.
+fn are_near(a: &(Vector3<f64>, Vector3<f64>), b: &(Vector3<f64>, Vector3<f64>), reach: f64) -> bool {
+    (0..3).all(|k| a.0[k] <= b.1[k] + reach && b.0[k] <= a.1[k] + reach)
 }
 
 /// The point of the core's surface nearest to `p`, in the surface's frame; `None` where it is `below` or farther.
@@ -152,10 +185,10 @@ fn nearest_on_core(
                 .map(|(_, q, _)| surface_from_solid * q)
         }
         Core::Convex(_) => {
-            let on_faces = solid
-                .faces
-                .iter()
-                .map(|f| closest::on_triangle(p, &f.map(|i| corners[i as usize])));
+            let faces = solid.faces.iter().map(|f| f.map(|i| corners[i as usize]));
+            let on_faces = faces
+                .filter(|f| are_near(&bounds(f), &(p.coords, p.coords), below))
+                .map(|f| closest::on_triangle(p, &f));
             on_faces.min_by(|a, b| (a - p).norm_squared().total_cmp(&(b - p).norm_squared()))
         }
     }
@@ -165,7 +198,7 @@ fn nearest_on_core(
 mod tests {
     use super::*;
     use crate::{Solid, TriMesh};
-    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use nalgebra::{Translation3, UnitQuaternion};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
