@@ -210,6 +210,65 @@ fn a_line_is_learned_and_its_model_survives_the_way_to_binary_and_back() {
 }
 
 #[test]
+fn a_model_goes_on_with_new_rows_and_says_what_they_leave_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let network = put(
+        folder.path(),
+        "line.toml",
+        "[[node]]\nname = \"kind\"\nkind = \"discrete\"\nstates = [\"x\", \"y\"]\n\
+         [[node]]\nname = \"a\"\nkind = \"gaussian_mixture\"\nparents = [\"kind\"]\nmixture = { components = 1 }\n",
+    );
+    let rows = |range: std::ops::Range<i32>| {
+        let mut table = String::from("kind,a\n");
+        for i in range {
+            let kind = if i % 2 == 0 { "x" } else { "y" };
+            writeln!(table, "{kind},{}", f64::from(i % 7) + f64::from(i % 2)).unwrap();
+        }
+        table
+    };
+    let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (part, all) = (out("part"), out("all"));
+    let learn = |rows: String, out: &str| {
+        prehend(
+            &["train", "-", "--network", &network, "--out", out, "--json"],
+            &rows,
+        )
+        .answer()
+    };
+    learn(rows(0..30), &part);
+    learn(rows(0..60), &all);
+    let model = format!("{part}/line.bin");
+    let arguments = ["train", "-", "--update", &model, "--out", &part, "--json"];
+    let answer = prehend(&arguments, &rows(30..60)).answer();
+    assert_eq!(
+        (&answer["rows"], &answer["rows_in_all"]),
+        (&json!(30), &json!(60))
+    );
+    assert_eq!(answer["nodes"]["a"]["n_effective"], json!([30.0, 30.0]));
+    let ask = |model: &str, more: &[&str]| {
+        let question = [
+            "query",
+            model,
+            "--target",
+            "kind",
+            "--evidence",
+            r#"{"a":3.5}"#,
+            "--json",
+        ];
+        prehend(&[&question[..], more].concat(), "").answer()
+    };
+    let (after, at_once) = (ask(&model, &[]), ask(&format!("{all}/line.bin"), &[]));
+    let of = |answer: &serde_json::Value| number(&answer["posterior"]["x"]);
+    assert!((of(&after) - of(&at_once)).abs() < 1e-9, "{after} and {at_once}");
+    let drawn = ask(&model, &["--draws", "20"]);
+    let interval = &drawn["interval"]["kind"]["x"];
+    assert!(
+        number(&interval[0]) < of(&drawn) && of(&drawn) < number(&interval[1]),
+        "{drawn}"
+    );
+}
+
+#[test]
 fn grasps_become_labels_a_model_a_plan_and_an_imitation() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

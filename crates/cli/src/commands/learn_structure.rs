@@ -72,7 +72,8 @@ impl Arguments {
             Some(path) => Some((path, Drawing::of(path)?)),
             None => None,
         };
-        let rows = self.rows.balanced(self.rows.read(&network.network)?, "")?;
+        let asks_for_task = network.network.nodes().iter().any(|node| node.name == "task");
+        let rows = self.rows.balanced(self.rows.read(asks_for_task)?, "")?;
         let options = StructureOptions {
             seed: self.rows.seed,
             group: self.rows.group.clone(),

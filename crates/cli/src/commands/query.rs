@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use prehend::frame::Frame;
-use prehend::model::{Cpd, Evidence, Latent, Model, ModelError};
+use prehend::model::{Cpd, Ensemble, EnsembleAnswer, Evidence, Latent, Model, ModelError, Target};
 use prehend::training::to_table;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -59,11 +59,16 @@ pub struct Arguments {
     #[arg(long)]
     counterfactual: Option<String>,
 
+    /// Average the answer over so many models whose parameters are drawn from what the training rows leave open; discrete
+    /// targets also get the interval in which nine tenths of them lie
+    #[arg(long, default_value_t = 0)]
+    draws: usize,
+
     /// Also so many joint values of the targets, drawn from the answer
     #[arg(long, default_value_t = 0)]
     samples: usize,
 
-    /// Seed of --samples
+    /// Seed of --samples and --draws
     #[arg(long, default_value_t = 0)]
     seed: u64,
 
@@ -78,6 +83,13 @@ pub struct Arguments {
     /// In --mpe, take the likeliest mixture components too, instead of summing over them
     #[arg(long, requires = "mpe")]
     mpe_components: bool,
+}
+
+/// Who is asked: the trained model, and the models that its rows allow.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    model: &'a Model,
+    ensemble: Option<&'a Ensemble>,
 }
 
 /// One question.
@@ -101,7 +113,20 @@ enum Targets {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        let model = self.apply_prior(read_model(&self.model)?)?;
+        let trained = read_model(&self.model)?;
+        let ensemble = match self.draws {
+            0 => None,
+            n => {
+                let members = trained.draws(n, self.seed).context("--draws")?;
+                let members = members.into_iter().map(|member| self.apply_prior(member));
+                Some(Ensemble::new(members.collect::<Result<_>>()?)?)
+            }
+        };
+        let model = self.apply_prior(trained)?;
+        let asked = Asked {
+            model: &model,
+            ensemble: ensemble.as_ref(),
+        };
         let at: Vec<Vec<f64>> = match &self.at {
             Some(text) => {
                 serde_json::from_str(text).map_err(|e| Usage(format!("--at: {e}; expected '[[x,y,…],…]'")))?
@@ -119,7 +144,7 @@ impl Arguments {
                     None => self.target.clone(),
                 };
                 let at = if question.at.is_empty() { &at } else { &question.at };
-                self.ask(&model, &targets, &evidence, at)
+                self.ask(asked, &targets, &evidence, at)
             };
             return output::each_json_line(json, file, run, output::plain);
         }
@@ -131,7 +156,7 @@ impl Arguments {
                 let table = to_table(&frame.select(&[row]))?;
                 let answers = Evidence::from_table(&model, &table)
                     .map_err(without_row)
-                    .and_then(|rows| self.ask(&model, &self.target, &rows[0], &at));
+                    .and_then(|rows| self.ask(asked, &self.target, &rows[0], &at));
                 answers.with_context(|| format!("{}, row {}", output::shown(file), row + 1))
             };
             return output::each(json, "line", rows, run, output::plain);
@@ -146,7 +171,7 @@ impl Arguments {
         };
         output::answer(
             json,
-            &self.ask(&model, &self.target, &evidence, &at)?,
+            &self.ask(asked, &self.target, &evidence, &at)?,
             output::plain,
         )?;
         Ok(Outcome::Done)
@@ -174,7 +199,8 @@ impl Arguments {
         }
     }
 
-    fn ask(&self, model: &Model, targets: &[String], evidence: &Evidence, at: &[Vec<f64>]) -> Result<Value> {
+    fn ask(&self, asked: Asked, targets: &[String], evidence: &Evidence, at: &[Vec<f64>]) -> Result<Value> {
+        let Asked { model, ensemble } = asked;
         if targets.is_empty() && !self.mpe {
             bail!(Usage("--target is missing: which node is asked about?".into()));
         }
@@ -187,8 +213,17 @@ impl Arguments {
                     model.direction_posterior(name, evidence)?.to_json_at(at)?
                 }
                 _ => {
-                    let posterior = model.posterior(&names, evidence)?;
+                    let all = ensemble
+                        .map(|ensemble| ensemble.posterior(&names, evidence))
+                        .transpose()?;
+                    let posterior = match &all {
+                        Some(all) => all.mean.clone(),
+                        None => model.posterior(&names, evidence)?,
+                    };
                     let mut answer = posterior.to_json_at(at)?;
+                    if let Some(all) = &all {
+                        answer["interval"] = interval(all);
+                    }
                     if self.samples > 0 {
                         answer["samples"] = posterior.samples_json(self.samples, self.seed);
                     }
@@ -226,6 +261,19 @@ impl Arguments {
         }
         Ok(answer)
     }
+}
+
+/// Where nine tenths of the members' probabilities lie: `{NODE: {STATE: [low, high]}}`.
+fn interval(answer: &EnsembleAnswer) -> Value {
+    let of_target = |target: &Target| match target {
+        Target::Continuous { .. } => None,
+        Target::Discrete { name, states } => {
+            let pairs = states.iter().cloned().zip(answer.interval(name, 0.9)?);
+            let pairs = pairs.map(|(state, (low, high))| (state, json!([low, high])));
+            Some((name.clone(), Value::Object(pairs.collect())))
+        }
+    };
+    Value::Object(answer.mean.targets.iter().filter_map(of_target).collect())
 }
 
 fn or_empty(value: Value) -> Value {

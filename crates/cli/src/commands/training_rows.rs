@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use prehend::frame::Frame;
 use prehend::labels::LabelStore;
-use prehend::model::{ModelError, Network};
+use prehend::model::ModelError;
 use prehend::training::{balanced_rows, labelled_copies};
 
 use super::grasps::{listed, read_tables};
@@ -40,8 +40,8 @@ pub struct TrainingRows {
 }
 
 impl TrainingRows {
-    /// All rows, with their labels.
-    pub fn read(&self, network: &Network) -> Result<Frame> {
+    /// All rows, with their labels. `asks_for_task`: there is a node `task` to learn.
+    pub fn read(&self, asks_for_task: bool) -> Result<Frame> {
         let frame = read_tables(&self.data)?;
         if let Some(labels) = &self.labels {
             if !labels.is_file() {
@@ -57,7 +57,6 @@ impl TrainingRows {
             }
             return Ok(labelled_copies(&frame, &answers)?);
         }
-        let asks_for_task = network.nodes().iter().any(|node| node.name == "task");
         if frame.column("task").is_none() && frame.column("grasp_id").is_some() && asks_for_task {
             bail!(
                 "these are grasp tables without a column `task`, which the network's node `task` needs; \
