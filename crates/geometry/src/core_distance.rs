@@ -7,7 +7,8 @@ use parry3d_f64::partitioning::{BvhNode, TraversalAction};
 
 use crate::closest;
 use crate::collider::{Collider, Core};
-use crate::parry_bridge::{self, Closest, ConvexBody};
+use crate::parry_bridge;
+use crate::separating_planes::{Plane, Planes};
 use crate::triangle_tree::TriangleTree;
 
 /// The closest points of a tree and a solid's core, both in the tree's frame; equal where they meet.
@@ -156,7 +157,7 @@ pub(crate) fn segment(tree_from_core: &Isometry3<f64>, half: f64) -> [Point3<f64
 }
 
 /// Closest points over the faces and edges of a polytope, the slow way; what GJK cannot settle ends here.
-fn by_features(
+pub(crate) fn by_features(
     collider: &Collider,
     tree_from_core: &Isometry3<f64>,
     triangle: &[Point3<f64>; 3],
@@ -179,97 +180,6 @@ fn by_features(
             best
         }
     })
-}
-
-/// A plane that touches a convex core, its normal away from the core.
-#[derive(Clone, Copy, Default)]
-struct Plane {
-    normal: Vector3<f64>,
-    height: f64,
-}
-
-impl Plane {
-    /// The plane with this unit normal.
-    fn on_core(body: &ConvexBody, tree_from_core: &Isometry3<f64>, normal: Vector3<f64>) -> Self {
-        let height = normal.dot(&body.farthest(tree_from_core, &normal).coords);
-        Self { normal, height }
-    }
-}
-
-/// How many planes are kept: contacts in a hollow need several.
-const N_PLANES: usize = 6;
-
-/// The last planes that were found.
-#[derive(Default)]
-struct Planes {
-    all: [Plane; N_PLANES],
-    n_found: usize,
-}
-
-impl Planes {
-    fn add(&mut self, plane: Option<Plane>) {
-        if let Some(plane) = plane {
-            self.all[self.n_found % N_PLANES] = plane;
-            self.n_found += 1;
-        }
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &Plane> {
-        self.all[..self.n_found.min(N_PLANES)].iter()
-    }
-
-    /// A lower bound of a triangle's distance from the core; may be negative.
-    fn distance_of(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-        let distance = |plane: &Plane| {
-            let height = |p: &Point3<f64>| plane.normal.dot(&p.coords);
-            height(a).min(height(b)).min(height(c)) - plane.height
-        };
-        self.iter().map(distance).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// A lower bound of the distance of everything in a node from the core; may be negative.
-    fn distance(&self, node: &BvhNode) -> f64 {
-        let (center, half) = parry_bridge::node_bounds(node);
-        let (center, half) = (Vector3::from(center), Vector3::from(half));
-        let distance =
-            |plane: &Plane| plane.normal.dot(&center) - plane.normal.abs().dot(&half) - plane.height;
-        self.iter().map(distance).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Closest points (core, triangle); `None` where they are not closer than `below`, by a plane that is then kept.
-    fn convex_to_triangle(
-        &mut self,
-        collider: &Collider,
-        body: &ConvexBody,
-        tree_from_core: &Isometry3<f64>,
-        triangle: &[Point3<f64>; 3],
-        below: f64,
-    ) -> Option<(Point3<f64>, Point3<f64>)> {
-        // From the core to the triangle's plane, if it lies on one side of it.
-        let [a, b, c] = triangle;
-        let normal = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE);
-        let towards = normal.map(|n| {
-            let center = tree_from_core * Point3::from(collider.core_center);
-            if n.dot(&(a - center)) < 0.0 { -n } else { n }
-        });
-        if let Some(normal) = towards {
-            let plane = Plane::on_core(body, tree_from_core, normal);
-            if normal.dot(&a.coords) - plane.height >= below {
-                self.add(Some(plane));
-                return None;
-            }
-        }
-        match parry_bridge::triangle_to_body(triangle, body, tree_from_core, below, towards.as_ref()) {
-            Closest::Apart(on_triangle, on_core) => Some((on_core, on_triangle)),
-            Closest::Intersecting => Some((triangle[0], triangle[0])),
-            Closest::Beyond(normal, on_core) => {
-                let height = normal.dot(&on_core.coords);
-                self.add(Some(Plane { normal, height }));
-                None
-            }
-            Closest::Unsettled => Some(by_features(collider, tree_from_core, triangle)),
-        }
-    }
 }
 
 /// A core's bounds seen from a tree, and a tree's nodes seen from the core.

@@ -63,6 +63,7 @@ mod parry_bridge;
 mod planar;
 mod read;
 mod repair;
+mod separating_planes;
 mod shared_volume;
 mod sides;
 mod signed_distance;
