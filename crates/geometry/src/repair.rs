@@ -79,12 +79,18 @@ pub fn repair(mesh: TriMesh) -> (TriMesh, Repairs) {
 
 /// Turns the smaller part of each manifold patch against which the larger one is wound; says how many.
 fn make_consistent(triangles: &mut [[u32; 3]], edges: &Edges) -> usize {
-    let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); triangles.len()];
+    // A triangle has as many neighbours as edges, at most.
+    let mut neighbours: Vec<[Option<(u32, bool)>; 3]> = vec![[None; 3]; triangles.len()];
+    let mut join = |triangle: usize, neighbour: usize, agree: bool| {
+        if let Some(place) = neighbours[triangle].iter_mut().find(|n| n.is_none()) {
+            *place = Some((neighbour as u32, agree));
+        }
+    };
     for (_, sides) in edges.iter() {
         if let [one, other] = sides {
             let agree = one.upward != other.upward;
-            neighbours[one.triangle].push((other.triangle, agree));
-            neighbours[other.triangle].push((one.triangle, agree));
+            join(one.triangle, other.triangle, agree);
+            join(other.triangle, one.triangle, agree);
         }
     }
     let mut turned: Vec<Option<bool>> = vec![None; triangles.len()];
@@ -97,7 +103,8 @@ fn make_consistent(triangles: &mut [[u32; 3]], edges: &Edges) -> usize {
         let mut patch = vec![seed];
         let mut queue = VecDeque::from([(seed, false)]);
         while let Some((triangle, is_turned)) = queue.pop_front() {
-            for &(neighbour, agree) in &neighbours[triangle] {
+            for (neighbour, agree) in neighbours[triangle].iter().flatten() {
+                let (neighbour, agree) = (*neighbour as usize, *agree);
                 if turned[neighbour].is_none() {
                     let turn = is_turned == agree;
                     turned[neighbour] = Some(turn);

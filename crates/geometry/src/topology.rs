@@ -9,22 +9,29 @@ use crate::TriMesh;
 /// Per vertex, the first vertex with the same coordinates (0 and −0 are the same).
 pub(crate) fn position_ids(vertices: &[Point3<f64>]) -> Vec<u32> {
     let key = |v: u32| {
-        vertices[v as usize]
-            .coords
-            .map(|c| if c == 0.0 { 0 } else { c.to_bits() })
+        let p = vertices[v as usize].coords;
+        [p.x, p.y, p.z].map(|c| if c == 0.0 { 0 } else { c.to_bits() })
     };
-    let mut order: Vec<u32> = (0..vertices.len() as u32).collect();
-    order.sort_unstable_by_key(|&v| {
-        let bits = key(v);
-        (bits.x, bits.y, bits.z, v)
-    });
+    // Sorted by a mixture of the coordinates' bits: equal positions have equal ones, and one number is quickly compared.
+    let mix = |[x, y, z]: [u64; 3]| {
+        let step = |sum: u64, part: u64| (sum ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+        step(step(step(0, x), y), z)
+    };
+    let mut order: Vec<(u64, u32)> = (0..vertices.len() as u32).map(|v| (mix(key(v)), v)).collect();
+    order.sort_unstable();
     let mut ids = vec![0; vertices.len()];
-    let mut first = 0;
-    for (rank, &vertex) in order.iter().enumerate() {
-        if rank == 0 || key(order[rank - 1]) != key(vertex) {
-            first = vertex;
+    for alike in order.chunk_by_mut(|a, b| a.0 == b.0) {
+        // The lowest vertex comes first. Different positions of one mixture are next to impossible, but allowed for.
+        if alike.iter().any(|a| key(a.1) != key(alike[0].1)) {
+            alike.sort_unstable_by_key(|a| (key(a.1), a.1));
         }
-        ids[vertex as usize] = first;
+        let mut first = alike[0].1;
+        for (_, vertex) in alike {
+            if key(*vertex) != key(first) {
+                first = *vertex;
+            }
+            ids[*vertex as usize] = first;
+        }
     }
     ids
 }
@@ -60,26 +67,46 @@ pub(crate) struct Edges {
 
 impl Edges {
     pub fn new(triangles: &[[u32; 3]]) -> Self {
-        let mut all: Vec<([u32; 2], Side)> = Vec::with_capacity(triangles.len() * 3);
-        for (triangle, &corners) in triangles.iter().enumerate().filter(|(_, t)| !is_collapsed(**t)) {
-            for k in 0..3 {
-                let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                all.push((
-                    [from.min(to), from.max(to)],
-                    Side {
-                        triangle,
-                        upward: from < to,
-                    },
-                ));
-            }
+        let sides = || {
+            let whole = triangles.iter().enumerate().filter(|(_, t)| !is_collapsed(**t));
+            whole.flat_map(|(triangle, corners)| {
+                (0..3).map(move |k| {
+                    let (from, to) = (corners[k], corners[(k + 1) % 3]);
+                    let upward = from < to;
+                    (from.min(to), from.max(to), Side { triangle, upward })
+                })
+            })
+        };
+        // Each vertex's few edges to higher ones get a place of their own, in which they are sorted.
+        let n_vertices = triangles.iter().flatten().max().map_or(0, |v| *v as usize + 1);
+        let mut first = vec![0; n_vertices + 1];
+        for (low, ..) in sides() {
+            first[low as usize + 1] += 1;
         }
-        all.sort_unstable();
-        let mut ends = Vec::new();
-        let mut starts = Vec::new();
-        for (index, (edge, _)) in all.iter().enumerate() {
-            if ends.last() != Some(edge) {
-                ends.push(*edge);
-                starts.push(index);
+        for v in 0..n_vertices {
+            first[v + 1] += first[v];
+        }
+        let none = Side {
+            triangle: 0,
+            upward: false,
+        };
+        let mut all = vec![(0, none); first[n_vertices]];
+        let mut next = first.clone();
+        for (low, high, side) in sides() {
+            all[next[low as usize]] = (high, side);
+            next[low as usize] += 1;
+        }
+        let mut ends: Vec<[u32; 2]> = Vec::with_capacity(all.len() / 2 + 1);
+        let mut starts = Vec::with_capacity(all.len() / 2 + 2);
+        for low in 0..n_vertices {
+            let range = first[low]..first[low + 1];
+            all[range.clone()].sort_unstable();
+            for index in range {
+                let edge = [low as u32, all[index].0];
+                if ends.last() != Some(&edge) {
+                    ends.push(edge);
+                    starts.push(index);
+                }
             }
         }
         starts.push(all.len());
