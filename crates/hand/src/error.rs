@@ -144,6 +144,13 @@ pub enum HandError {
         reason: String,
     },
 
+    /// How the hand grasps cannot be worked out from its URDF.
+    #[error("how this closes cannot be worked out: {reason}")]
+    NotAHand {
+        /// What is missing.
+        reason: String,
+    },
+
     /// A posture names a joint that the hand does not have.
     #[error("`{joint}` is not a movable joint of `{hand}`; it has {known}")]
     UnknownJoint {

@@ -6,7 +6,8 @@
 //!
 //! How a hand grasps — where its palm looks, which joints close it, which directions in joint space its pre-shapes are
 //! made of, what its links are made of — stands in a `hand.toml` beside the URDF and is added by
-//! [`Hand::with_description`]. Hands are data: no code here knows any hand's name.
+//! [`Hand::with_description`]. Hands are data: no code here knows any hand's name. Where nobody wrote one,
+//! [`Hand::propose_description`] works it out from shape and kinematics, and says how sure it is.
 //!
 //! Lengths are metres, angles radians, masses kilograms. This crate opens no files: mesh bytes come from a resolver.
 //!
@@ -40,6 +41,7 @@ mod hand;
 mod hand_toml;
 mod kinematics;
 mod posture;
+mod propose;
 mod shape;
 mod urdf;
 mod xml;
@@ -50,4 +52,5 @@ pub use hand::{Hand, Joint, JointIdx, JointKind, Link, LinkIdx, Mimic};
 pub use hand_toml::urdf_named_in;
 pub use kinematics::LinkPoses;
 pub use posture::JointPositions;
+pub use propose::{Confidence, Guess, Proposal};
 pub use shape::Resolve;

@@ -95,7 +95,7 @@ fn urdf_of_folder(folder: &Path) -> Result<PathBuf, Error> {
 
 /// Where a mesh named by a URDF lies: beside the URDF, or for `package://NAME/REST` in the nearest folder above that
 /// is or holds `NAME`, else `REST` beside the URDF.
-fn resource(folder: &Path, name: &str) -> PathBuf {
+pub(crate) fn resource(folder: &Path, name: &str) -> PathBuf {
     let name = name.strip_prefix("file://").unwrap_or(name);
     let Some(rest) = name.strip_prefix("package://") else {
         return folder.join(name);

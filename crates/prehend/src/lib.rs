@@ -9,6 +9,7 @@ pub mod files;
 pub mod frame;
 pub mod grasp_table;
 pub mod hand_folder;
+pub mod hand_init;
 pub mod labels;
 pub mod object;
 pub mod partial_view;

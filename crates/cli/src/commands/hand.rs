@@ -1,4 +1,4 @@
-//! `prehend hand PATH`
+//! `prehend hand PATH` and `prehend hand init FILE.urdf --out DIR`
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,16 +7,25 @@ use anyhow::{Context, Result};
 use nalgebra::Isometry3;
 use prehend::hand::{Hand, JointKind};
 use prehend::hand_folder::read_hand;
+use prehend::hand_init::init;
 use serde_json::{Map, Value, json};
 
 use crate::output::{self, Outcome, Usage};
 
 /// What a hand is made of, and where its links are in a posture
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  prehend hand hands/schunk_sdh --posture '{}' --json")]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Example:\n  prehend hand hands/schunk_sdh --posture '{}' --json"
+)]
 pub struct Arguments {
+    #[command(subcommand)]
+    action: Option<Action>,
+
     /// A folder under hands/, or a .urdf
-    path: PathBuf,
+    #[arg(required = true)]
+    path: Option<PathBuf>,
 
     /// Joint positions by name, as JSON; missing joints 0, mimic joints follow
     #[arg(long, conflicts_with = "postures")]
@@ -27,9 +36,86 @@ pub struct Arguments {
     postures: Option<PathBuf>,
 }
 
+#[derive(clap::Subcommand)]
+enum Action {
+    /// Write a hand folder for any hand's URDF: palm, fingers, closing and pre-shapes are worked out from its shape
+    Init(InitArguments),
+}
+
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  prehend hand init my_gripper.urdf --out hands/my_gripper")]
+struct InitArguments {
+    /// The hand's URDF; meshes beside it, or as package://NAME/… in a folder above it
+    urdf: PathBuf,
+
+    /// The folder to write: hand.toml, the URDF and its meshes
+    #[arg(long)]
+    out: PathBuf,
+
+    /// Write hand.toml anew where the folder has one
+    #[arg(long)]
+    force: bool,
+}
+
+impl InitArguments {
+    fn run(self, json: bool) -> Result<Outcome> {
+        let made = init(&self.urdf, &self.out, self.force)?;
+        let guesses: Vec<Value> = made
+            .proposal
+            .guesses
+            .iter()
+            .map(|g| json!({ "key": g.key, "found": g.found, "because": g.because, "confidence": g.confidence.as_str() }))
+            .collect();
+        let link = |l: prehend::hand::LinkIdx| made.hand.link(l).name.clone();
+        let exempt: Vec<Value> = made
+            .proposal
+            .exempt
+            .iter()
+            .map(|(a, b, because)| json!({ "links": [link(*a), link(*b)], "because": because }))
+            .collect();
+        if !json {
+            for guess in &made.proposal.guesses {
+                eprintln!(
+                    "{}: {}\n  {} confidence: {}",
+                    guess.key,
+                    guess.found,
+                    guess.confidence.as_str(),
+                    guess.because
+                );
+            }
+            for note in &made.notes {
+                eprintln!("note: {note}");
+            }
+        }
+        let answer = json!({
+            "out": self.out.to_string_lossy(),
+            "files": made.files,
+            "hand": describe(&made.hand),
+            "guesses": guesses,
+            "self_collision_exempt": exempt,
+            "notes": made.notes,
+        });
+        output::answer(json, &answer, |a| {
+            format!(
+                "{}: {} written; look at {}/hand.toml",
+                a["out"].as_str().unwrap_or(""),
+                a["files"].as_array().map_or(0, Vec::len),
+                a["out"].as_str().unwrap_or("")
+            )
+        })?;
+        Ok(Outcome::Done)
+    }
+}
+
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        let hand = read_hand(&self.path)?;
+        if let Some(Action::Init(init)) = self.action {
+            return init.run(json);
+        }
+        let path = self
+            .path
+            .ok_or_else(|| Usage("give a hand's folder or a .urdf".to_owned()))?;
+        let hand = read_hand(&path)?;
         let mut facts = describe(&hand);
         if let Some(file) = &self.postures {
             let run = |value: Value| Ok(json!({ "poses": poses(&hand, value)? }));

@@ -24,6 +24,11 @@ pub struct HandData {
     pub fingerprint: String,
 }
 
+/// Extensions of the files that make a hand: what its description, kinematics and shapes are read from.
+const HAND_FILES: [&str; 10] = [
+    "toml", "urdf", "stl", "obj", "ply", "off", "dae", "gltf", "glb", "bin",
+];
+
 impl HandData {
     /// Reads a hand that can grasp.
     ///
@@ -33,7 +38,7 @@ impl HandData {
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let hand = hand_folder::read_described_hand(folder)?;
         let mut print = Fingerprint::of_stage("hand");
-        for file in files::list(folder, &["toml", "urdf", "stl", "obj", "ply", "off"])? {
+        for file in files::list(folder, &HAND_FILES)? {
             print = print.with(&files::read(&file)?);
         }
         Ok(Self {

@@ -1,0 +1,385 @@
+//! Which links are the palm, and which chains are fingers.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_geometry::{Collider, Solid, Surface, TriMesh, convex_hull};
+
+use crate::{Hand, HandError, JointIdx, JointPositions, LinkIdx};
+
+/// A chain that is driven by another one's joints and shorter than this share of it is a linkage, not a finger.
+const LINKAGE_SHARE: f64 = 0.6;
+/// Axes that differ by less than this angle's cosine (15°) count as parallel.
+const PARALLEL: f64 = 0.966;
+
+/// The parts of a hand: what moves as one, and what hangs on what.
+pub(super) struct Anatomy<'a> {
+    pub hand: &'a Hand,
+    /// Convex hull of each link's shape, link frame; empty where it has none.
+    pub points: Vec<Vec<Point3<f64>>>,
+    /// Links that fixed joints hold together, each from the root outwards.
+    pub groups: Vec<Vec<LinkIdx>>,
+    /// The group that the fingers hang on.
+    pub palm_group: usize,
+    /// The link of that group with the largest shape.
+    pub palm: LinkIdx,
+    /// The fingers, in the URDF's order.
+    pub fingers: Vec<Chain>,
+    /// How many chains were left out as linkages.
+    pub n_linkages: usize,
+}
+
+/// A way from the palm to a link at whose end nothing more moves.
+pub(super) struct Chain {
+    /// Movable joints on it, from the palm outwards.
+    pub joints: Vec<JointIdx>,
+    /// Links with a shape on it, from the palm outwards; never empty.
+    pub links: Vec<LinkIdx>,
+    /// Hull of what the last joint moves, in the frame of `tip_link`.
+    pub tip: Collider,
+    /// Its corners.
+    pub tip_points: Vec<Point3<f64>>,
+    /// The frame of `tip`.
+    pub tip_link: LinkIdx,
+    /// Its joints that flex it: the largest set of parallel axes, the farthest out where sets are of one size.
+    pub flexion: Vec<JointIdx>,
+}
+
+/// Corners of the convex hull of all solids of a link, link frame.
+fn link_points(hand: &Hand, link: usize) -> Vec<Point3<f64>> {
+    let solids = hand.links()[link].collision.iter();
+    let points: Vec<Point3<f64>> = solids
+        .flat_map(|placed| {
+            let mesh = placed.solid.display_mesh();
+            mesh.vertices()
+                .iter()
+                .map(|p| placed.link_from_solid * p)
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    hull_corners(points)
+}
+
+/// The corners that a convex hull needs; all points where they span no volume.
+fn hull_corners(points: Vec<Point3<f64>>) -> Vec<Point3<f64>> {
+    match convex_hull(&points) {
+        Ok(hull) => {
+            let used: BTreeSet<u32> = hull.triangles().iter().flatten().copied().collect();
+            used.iter().map(|&i| hull.points()[i as usize]).collect()
+        }
+        Err(_) => points,
+    }
+}
+
+/// The hull of points as something to measure distances of.
+pub(super) fn hull_of(points: &[Point3<f64>]) -> Option<Collider> {
+    Collider::new(&Solid::Hull(points.to_vec().into())).ok()
+}
+
+impl<'a> Anatomy<'a> {
+    pub fn new(hand: &'a Hand) -> Result<Self, HandError> {
+        let points: Vec<Vec<Point3<f64>>> = (0..hand.links.len()).map(|l| link_points(hand, l)).collect();
+        if points.iter().all(Vec::is_empty) {
+            return Err(not_a_hand(
+                "no link has a <collision> shape; add shapes to touch with",
+            ));
+        }
+        let tree = Tree::new(hand, &points);
+        let palm_group = tree.palm_group();
+        let palm = tree.groups[palm_group]
+            .iter()
+            .copied()
+            .max_by(|a, b| {
+                // The first of equals.
+                diagonal(&points[a.0])
+                    .total_cmp(&diagonal(&points[b.0]))
+                    .then(b.cmp(a))
+            })
+            .expect("a group has links");
+        let zero = hand.joint_positions_from_slice(&vec![0.0; hand.joints.len()]);
+        let mut fingers: Vec<Chain> = Vec::new();
+        for leaf in tree.leaves_below(palm_group) {
+            fingers.extend(tree.chain(palm_group, leaf, &points, &zero));
+        }
+        if fingers.is_empty() {
+            return Err(not_a_hand(
+                "no movable joint carries a link with a shape; a hand needs at least one finger that moves",
+            ));
+        }
+        let n_chains = fingers.len();
+        let fingers = without_linkages(hand, fingers, &zero);
+        Ok(Self {
+            hand,
+            groups: tree.groups,
+            palm_group,
+            palm,
+            n_linkages: n_chains - fingers.len(),
+            fingers,
+            points,
+        })
+    }
+
+    /// Points of the whole palm, in the frame of the palm's link. Empty where it has no shape.
+    pub fn palm_points(&self) -> Vec<Point3<f64>> {
+        let zero = self
+            .hand
+            .joint_positions_from_slice(&vec![0.0; self.hand.joints.len()]);
+        let poses = self.hand.link_poses(&zero);
+        let palm_from_root = poses.root_from_link(self.palm).inverse();
+        self.groups[self.palm_group]
+            .iter()
+            .flat_map(|&link| {
+                let palm_from_link = palm_from_root * poses.root_from_link(link);
+                self.points[link.0].iter().map(move |p| palm_from_link * p)
+            })
+            .collect()
+    }
+
+    /// The whole palm's surface, in the frame of the palm's link.
+    pub fn palm_surface(&self) -> Option<Surface> {
+        let zero = self
+            .hand
+            .joint_positions_from_slice(&vec![0.0; self.hand.joints.len()]);
+        let poses = self.hand.link_poses(&zero);
+        let palm_from_root = poses.root_from_link(self.palm).inverse();
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for &link in &self.groups[self.palm_group] {
+            for placed in &self.hand.link(link).collision {
+                let mesh = placed.solid.display_mesh();
+                let palm_from_solid = palm_from_root * poses.root_from_link(link) * placed.link_from_solid;
+                let first = vertices.len() as u32;
+                vertices.extend(mesh.vertices().iter().map(|p| palm_from_solid * p));
+                triangles.extend(mesh.triangles().iter().map(|t| t.map(|i| i + first)));
+            }
+        }
+        Some(Surface::new(TriMesh::new(vertices, triangles).ok()?))
+    }
+
+    /// The free joint that a joint follows, and by which factor.
+    pub fn leader(&self, joint: JointIdx) -> (usize, f64) {
+        leader(self.hand, joint)
+    }
+
+    /// Pose of a finger's last link in the palm link's frame.
+    pub fn palm_from_tip(&self, finger: &Chain, positions: &JointPositions) -> Isometry3<f64> {
+        self.hand.link_pose(self.palm, positions).inverse() * self.hand.link_pose(finger.tip_link, positions)
+    }
+
+    /// All links that could touch: the palm's and the fingers', linkages among them.
+    pub fn contact_links(&self) -> Vec<LinkIdx> {
+        let below = |link: LinkIdx| {
+            let mut at = Some(link);
+            while let Some(l) = at {
+                if self.groups[self.palm_group].contains(&l) {
+                    return true;
+                }
+                at = self.hand.parent(l);
+            }
+            false
+        };
+        (0..self.hand.links.len())
+            .map(LinkIdx)
+            .filter(|&l| !self.points[l.0].is_empty() && below(l))
+            .collect()
+    }
+}
+
+pub(super) fn not_a_hand(reason: &str) -> HandError {
+    HandError::NotAHand {
+        reason: reason.to_owned(),
+    }
+}
+
+fn leader(hand: &Hand, joint: JointIdx) -> (usize, f64) {
+    let mimic = hand.joint(joint).mimic;
+    mimic.map_or((joint.0, 1.0), |m| (m.joint.0, m.multiplier))
+}
+
+/// Length of the diagonal of the box along the axes around points.
+pub(super) fn diagonal(points: &[Point3<f64>]) -> f64 {
+    let low = points
+        .iter()
+        .fold(Vector3::repeat(f64::INFINITY), |l, p| l.inf(&p.coords));
+    let high = points
+        .iter()
+        .fold(Vector3::repeat(f64::NEG_INFINITY), |h, p| h.sup(&p.coords));
+    if points.is_empty() {
+        0.0
+    } else {
+        (high - low).norm()
+    }
+}
+
+/// Groups of links that move as one, as a tree.
+struct Tree<'a> {
+    hand: &'a Hand,
+    groups: Vec<Vec<LinkIdx>>,
+    /// The group that carries each, and the joint between them.
+    parents: Vec<Option<(usize, JointIdx)>>,
+    /// Whether it or anything that it carries has a shape.
+    bears_shape: Vec<bool>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(hand: &'a Hand, points: &[Vec<Point3<f64>>]) -> Self {
+        let mut group_of = vec![0; hand.links.len()];
+        let mut groups = vec![vec![hand.root()]];
+        let mut parents = vec![None];
+        for attachment in &hand.attachments {
+            let parent = group_of[attachment.parent.0];
+            let group = if let Some(joint) = attachment.joint {
+                groups.push(Vec::new());
+                parents.push(Some((parent, joint)));
+                groups.len() - 1
+            } else {
+                parent
+            };
+            group_of[attachment.child.0] = group;
+            groups[group].push(attachment.child);
+        }
+        let mut bears_shape: Vec<bool> = groups
+            .iter()
+            .map(|g| g.iter().any(|l| !points[l.0].is_empty()))
+            .collect();
+        // Parents come before their children.
+        for group in (0..groups.len()).rev() {
+            if let (true, Some((parent, _))) = (bears_shape[group], parents[group]) {
+                bears_shape[parent] = true;
+            }
+        }
+        Self {
+            hand,
+            groups,
+            parents,
+            bears_shape,
+        }
+    }
+
+    fn children(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.groups.len())
+            .filter(move |&g| self.bears_shape[g] && self.parents[g].is_some_and(|(p, _)| p == group))
+    }
+
+    /// The first group from the root outwards at which the tree branches; the root's where it never does.
+    fn palm_group(&self) -> usize {
+        let mut at = 0;
+        loop {
+            let mut children = self.children(at);
+            match (children.next(), children.next()) {
+                (Some(only), None) => at = only,
+                (Some(_), Some(_)) => return at,
+                (None, _) => return 0,
+            }
+        }
+    }
+
+    /// Groups below `palm` that carry no further one, in the order of their first joint.
+    fn leaves_below(&self, palm: usize) -> Vec<usize> {
+        let is_below = |group: usize| {
+            let mut at = self.parents[group];
+            while let Some((parent, _)) = at {
+                if parent == palm {
+                    return true;
+                }
+                at = self.parents[parent];
+            }
+            false
+        };
+        let mut leaves: Vec<usize> = (0..self.groups.len())
+            .filter(|&g| self.bears_shape[g] && is_below(g) && self.children(g).next().is_none())
+            .collect();
+        leaves.sort_by_key(|&g| self.way(palm, g).first().map(|(_, joint)| *joint));
+        leaves
+    }
+
+    /// Groups and joints from `palm` (left out) to `leaf`.
+    fn way(&self, palm: usize, leaf: usize) -> Vec<(usize, JointIdx)> {
+        let mut way = Vec::new();
+        let mut at = leaf;
+        while let Some((parent, joint)) = self.parents[at] {
+            if at == palm {
+                break;
+            }
+            way.push((at, joint));
+            at = parent;
+        }
+        way.reverse();
+        way
+    }
+
+    fn chain(
+        &self,
+        palm: usize,
+        leaf: usize,
+        points: &[Vec<Point3<f64>>],
+        zero: &JointPositions,
+    ) -> Option<Chain> {
+        let way = self.way(palm, leaf);
+        let with_shape = |g: usize| self.groups[g].iter().copied().filter(|l| !points[l.0].is_empty());
+        let links: Vec<LinkIdx> = way.iter().flat_map(|(g, _)| with_shape(*g)).collect();
+        let tip_link = *links.last()?;
+        let poses = self.hand.link_poses(zero);
+        let tip_from_root = poses.root_from_link(tip_link).inverse();
+        let tip_points = with_shape(leaf)
+            .flat_map(|l| {
+                let tip_from_link = tip_from_root * poses.root_from_link(l);
+                points[l.0].iter().map(move |p| tip_from_link * p)
+            })
+            .collect::<Vec<_>>();
+        let tip_points = hull_corners(tip_points);
+        let joints: Vec<JointIdx> = way.iter().map(|(_, joint)| *joint).collect();
+        Some(Chain {
+            flexion: self.flexion(&joints, zero),
+            joints,
+            links,
+            tip: hull_of(&tip_points)?,
+            tip_points,
+            tip_link,
+        })
+    }
+
+    fn flexion(&self, joints: &[JointIdx], zero: &JointPositions) -> Vec<JointIdx> {
+        let poses = self.hand.link_poses(zero);
+        let slides = |j: JointIdx| self.hand.joint(j).kind == crate::JointKind::Prismatic;
+        let axis = |j: JointIdx| self.hand.joint_axis(j, &poses).1;
+        let mut best: Vec<JointIdx> = Vec::new();
+        for &seed in joints {
+            let set: Vec<JointIdx> = joints
+                .iter()
+                .copied()
+                .filter(|&j| slides(j) == slides(seed) && axis(j).dot(&axis(seed)).abs() > PARALLEL)
+                .collect();
+            if set.len() >= best.len() {
+                best = set;
+            }
+        }
+        best
+    }
+}
+
+/// Fingers without the chains that only guide them.
+fn without_linkages(hand: &Hand, fingers: Vec<Chain>, zero: &JointPositions) -> Vec<Chain> {
+    let poses = hand.link_poses(zero);
+    let drivers =
+        |chain: &Chain| -> BTreeSet<usize> { chain.joints.iter().map(|&j| leader(hand, j).0).collect() };
+    // How far its tip reaches from its first joint.
+    let reach = |chain: &Chain| {
+        let (base, _) = hand.joint_axis(chain.joints[0], &poses);
+        let root_from_tip = poses.root_from_link(chain.tip_link);
+        let far = chain.tip_points.iter().map(|p| (root_from_tip * p - base).norm());
+        far.fold(0.0, f64::max)
+    };
+    let facts: Vec<(BTreeSet<usize>, f64)> = fingers.iter().map(|c| (drivers(c), reach(c))).collect();
+    let is_linkage = |i: usize| {
+        let (own, length) = &facts[i];
+        facts
+            .iter()
+            .any(|(others, longer)| own.is_subset(others) && *length < LINKAGE_SHARE * longer)
+    };
+    let kept: Vec<bool> = (0..fingers.len()).map(|i| !is_linkage(i)).collect();
+    let mut kept = kept.into_iter();
+    fingers
+        .into_iter()
+        .filter(|_| kept.next().unwrap_or(true))
+        .collect()
+}
