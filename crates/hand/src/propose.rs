@@ -134,6 +134,8 @@ impl Hand {
             origin: self.joint_positions_from_slice(&preshapes.origin),
             opening_width,
             self_collision_exempt: pairs.iter().copied().collect(),
+            // A URDF's mimic joints are rigid.
+            break_away: Vec::new(),
         };
         let mut described = self.clone();
         described.description = Some(description(&preshapes, 0.1));
