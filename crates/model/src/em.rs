@@ -182,9 +182,13 @@ fn normalize(logs: &mut [f64], n: usize, totals: &mut Vec<f64>) {
             *sum += *log;
         }
     }
+    let mut inverse = [0.0; BLOCK];
+    for (inverse, sum) in inverse.iter_mut().zip(&sums[..n]) {
+        *inverse = 1.0 / sum;
+    }
     for part in logs.chunks_exact_mut(n) {
-        for (share, sum) in part.iter_mut().zip(&sums) {
-            *share /= sum;
+        for (share, inverse) in part.iter_mut().zip(&inverse) {
+            *share *= inverse;
         }
     }
     for (b, (total, sum)) in totals.iter_mut().zip(&sums).enumerate() {

@@ -5,16 +5,15 @@
 //! long before they settle.
 
 use nalgebra::DVector;
-use rand::{Rng, RngExt};
+use rand::Rng;
 
 use crate::cpd::Weights;
 use crate::em::{Fit, Rows, expect, gather, resume, row_log_densities, run};
+use crate::k_means::k_means;
 use crate::moments::{Mixing, Moment, maximize};
 
 /// Share of a row's responsibility that its own cluster starts with.
 const SOFT: f64 = 0.9;
-/// Lloyd steps after k-means++: the start only has to be near.
-const LLOYD_STEPS: usize = 8;
 /// EM steps of each start before the worse half is given up.
 const FIRST_STEPS: usize = 4;
 /// EM steps of the better half before the best one is carried on.
@@ -361,74 +360,6 @@ fn cluster(rows: &Rows, features: Option<&[f64]>, k: usize, rng: &mut impl Rng) 
     soften(rows, &labels, k)
 }
 
-/// Cluster and sign of each point; clusters are numbered by falling mass.
-fn k_means(
-    points: &[&[f64]],
-    weights: &[f64],
-    k: usize,
-    latent_sign: bool,
-    rng: &mut impl Rng,
-) -> Vec<(usize, f64)> {
-    let n = points.len();
-    let d = points[0].len();
-    let distance = |x: &[f64], center: &[f64]| -> (f64, f64) {
-        let (mut plus, mut minus) = (0.0, 0.0);
-        for (x, c) in x.iter().zip(center) {
-            plus += (x - c) * (x - c);
-            minus += (x + c) * (x + c);
-        }
-        if latent_sign && minus < plus {
-            (minus, -1.0)
-        } else {
-            (plus, 1.0)
-        }
-    };
-    let mut centers = vec![points[draw(weights, rng)].to_vec()];
-    let mut square: Vec<f64> = vec![f64::INFINITY; n];
-    let mut weighted = vec![0.0; n];
-    while centers.len() < k {
-        let newest = &centers[centers.len() - 1];
-        for i in 0..n {
-            square[i] = square[i].min(distance(points[i], newest).0);
-            weighted[i] = square[i] * weights[i];
-        }
-        centers.push(points[draw(&weighted, rng)].to_vec());
-    }
-    let mut label = vec![(0, 1.0); n];
-    let mut masses = vec![0.0; k];
-    for _ in 0..LLOYD_STEPS {
-        let mut sums = vec![0.0; k * d];
-        masses.fill(0.0);
-        for (i, label) in label.iter_mut().enumerate() {
-            let mut least = f64::INFINITY;
-            for (c, center) in centers.iter().enumerate() {
-                let (square, sign) = distance(points[i], center);
-                if square < least {
-                    least = square;
-                    *label = (c, sign);
-                }
-            }
-            let (c, sign) = *label;
-            masses[c] += weights[i];
-            for (sum, x) in sums[c * d..].iter_mut().zip(points[i]) {
-                *sum += weights[i] * sign * x;
-            }
-        }
-        for (c, center) in centers.iter_mut().enumerate().filter(|(c, _)| masses[*c] > 0.0) {
-            for (value, sum) in center.iter_mut().zip(&sums[c * d..]) {
-                *value = sum / masses[c];
-            }
-        }
-    }
-    let mut order: Vec<usize> = (0..k).collect();
-    order.sort_by(|&a, &b| masses[b].total_cmp(&masses[a]));
-    let mut number = vec![0; k];
-    for (new, &old) in order.iter().enumerate() {
-        number[old] = new;
-    }
-    label.into_iter().map(|(c, sign)| (number[c], sign)).collect()
-}
-
 /// Moments where most of each row goes to its own cluster, with its sign.
 fn soften(rows: &Rows, label: &[(usize, f64)], k: usize) -> Vec<Vec<Moment>> {
     let (soft, rest) = if k == 1 {
@@ -443,15 +374,57 @@ fn soften(rows: &Rows, label: &[(usize, f64)], k: usize) -> Vec<Vec<Moment>> {
     })
 }
 
-/// An index drawn in proportion to weights; the first where all are zero.
-fn draw(weights: &[f64], rng: &mut impl Rng) -> usize {
-    let total: f64 = weights.iter().filter(|w| w.is_finite()).sum();
-    let mut left = rng.random::<f64>() * total;
-    for (i, weight) in weights.iter().enumerate() {
-        left -= weight;
-        if left < 0.0 && *weight > 0.0 {
-            return i;
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::moments::{CovariancePrior, RIDGE, Settings};
+
+    /// A grid without clusters, where a start depends on what is drawn.
+    fn grid() -> Rows {
+        let points = (0..400).map(|i| (f64::from(i % 20), f64::from(i / 20)));
+        Rows {
+            settings: Settings {
+                d: 2,
+                q: 0,
+                weights: Weights::PerConfiguration,
+                tied: false,
+                floor: vec![0.0; 2],
+                latent_sign: false,
+                ridge: vec![RIDGE],
+                prior: CovariancePrior::WEAK,
+            },
+            z: points.flat_map(|(x, y)| [x, y, 1.0]).collect(),
+            weights: vec![1.0; 400],
+            ends: vec![400],
+            earlier: Vec::new(),
         }
     }
-    0
+
+    #[test]
+    fn restarts_start_apart() {
+        let rows = grid();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut means = || -> Vec<f64> {
+            let start = maximize(&rows.settings, &cluster(&rows, None, 3, &mut rng));
+            start
+                .set(0)
+                .iter()
+                .flat_map(|part| part.slopes.iter().copied())
+                .collect()
+        };
+        let starts = [means(), means(), means()];
+        for (i, one) in starts.iter().enumerate() {
+            for other in &starts[i + 1..] {
+                let apart = one
+                    .iter()
+                    .zip(other)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max);
+                assert!(apart > 0.1, "two starts with means within {apart}");
+            }
+        }
+    }
 }

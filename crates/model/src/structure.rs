@@ -7,6 +7,7 @@
 
 mod family_score;
 mod graph;
+mod mixture_score;
 mod rules;
 mod scores;
 mod search;

@@ -121,3 +121,21 @@ fn units_are_a_matter_of_names() {
         }
     }
 }
+
+#[test]
+fn a_component_that_loses_its_rows_is_started_anew_once_then_dropped_and_told() {
+    // Forty rows that lie evenly, and one far away: no component of its own for a single row.
+    let mut values: Vec<f64> = (0..40).map(|i| f64::from(i) / 40.0).collect();
+    values.push(1000.0);
+    let table = Table::new(41).with_numbers("x", values).unwrap();
+    let trained = fit(
+        "[[node]]\nname = \"x\"\nkind = \"gaussian_mixture\"\nmixture = { components = 2 }\n",
+        &table,
+    );
+    let cell = &trained.report.nodes[0].cells[0];
+    assert_eq!((cell.components, cell.reinitialized, cell.dropped), (1, 1, 1));
+    assert_eq!(
+        trained.report.warnings,
+        ["`x`: 1 of 2 components kept their rows; the others were dropped"]
+    );
+}
