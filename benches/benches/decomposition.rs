@@ -17,6 +17,7 @@ fn decomposition(c: &mut Criterion) {
         let shape = shape_of(&path, ObjectOptions::default()).expect("the bundled objects are there");
         for (how, method) in [
             ("fit_and_split", DecomposeMethod::FitAndSplit),
+            ("refined", DecomposeMethod::Refined { price: 0.02 }),
             ("four_boxes", DecomposeMethod::Exactly { boxes: 4 }),
         ] {
             let options = DecomposeOptions {

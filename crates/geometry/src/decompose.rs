@@ -7,21 +7,26 @@ mod fit;
 mod paper;
 mod refined;
 mod region;
+mod simplify;
+mod whole;
 
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::{BoxRecord, GeometryError, OrientedBox, TriMesh};
+use body::Body;
 use paper::fit_and_split;
 use refined::refine;
 
 /// How boxes are found.
 ///
-/// The two methods beyond the paper's first cut the body into more pieces than are wanted. Planes come from the images
-/// on the faces of its box and on faces turned by 45°, from facets at concave edges, and from the middle of the box;
-/// what they leave is measured by the boxes fitted to both sides; where no cut takes off much, the one is taken whose
-/// sides lose most by the next. Pieces are then merged two by two, where V(A ∪ B) − V(A) − V(B) is least, and
-/// neighbouring boxes are cut anew together, with the cut moved to its best place by golden section, for as long as
-/// that leaves less.
+/// The two methods beyond the paper first cut the body into more pieces than are wanted. Planes across and aslant the
+/// axes of a piece's box are swept, and those of facets at concave edges tried; what they leave is measured by boxes in
+/// sampled directions first and, for the best, by boxes fitted to both sides. Where no cut takes off much, the one is
+/// taken whose sides lose most by the next. Pieces are then merged two by two, where V(A ∪ B) − V(A) − V(B) is least, and
+/// neighbouring boxes are cut anew together, with the cut moved to its best place, for as long as that leaves less.
+/// All this looks at no more than some 2,000 triangles, to which finer surfaces are simplified; the boxes are then fitted
+/// to what the same planes leave of all triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum DecomposeMethod {
     /// The paper's fit and split, see [`decompose`]: what `size`, `cvex` and the grasp hypotheses rest on.
@@ -194,8 +199,8 @@ fn with_volumes<S: Serializer>(boxes: &[OrientedBox], serializer: S) -> Result<S
 ///
 /// Cuts are chosen in a frame that the body carries with it (principal axes of its surface), with coordinates rounded
 /// to 1e-9 of its size and boxes found quickly; whether a split counts is decided by the smallest boxes around the
-/// triangles where they lie. So cvex does not depend on how the body is turned, but for the 5e-4 by which
-/// [`minimum_volume_box`](crate::minimum_volume_box) prefers boxes along the frame.
+/// triangles where they lie. So cvex does not depend on how the body is turned, but for what
+/// [`minimum_volume_box`](crate::minimum_volume_box) misses in one pose and finds in another.
 ///
 /// Together the boxes cover the surface exactly and, where it is closed, the inside: they hold the clipped triangles,
 /// and the points inside where three cuts meet. The cavity of a vessel counts as object, since the rim of each cut
@@ -227,8 +232,49 @@ fn with_volumes<S: Serializer>(boxes: &[OrientedBox], serializer: S) -> Result<S
 /// ```
 pub fn decompose(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposition, GeometryError> {
     options.check()?;
+    boxes_of(&Body::of_mesh(mesh, options)?, options)
+}
+
+/// Wraps points without a surface in boxes: [`decompose`] for a cloud.
+///
+/// All is as there, with images and boxes of points in the place of images and boxes of triangles. The boxes together
+/// hold every point, and nothing is known of what lies between points: a cut may pass through any gap, and a scan of one
+/// side of a body is the thin shell that it is. A cut leaves at least 20 points on either side, so few stray points
+/// get no boxes of their own but stretch those of others: filter a scan first. The more points, the closer the boxes come
+/// to those of the surface they lie on; duplicates change nothing but this count.
+///
+/// # Errors
+///
+/// As [`decompose`]; [`GeometryError::Empty`] for no points, [`GeometryError::NotFinite`] for a coordinate that is NaN or
+/// infinite.
+///
+/// # Examples
+///
+/// ```
+/// use nalgebra::Point3;
+/// use prehend_geometry::{DecomposeOptions, decompose_points};
+///
+/// // Two bars that form an L, 40 mm wide and 160 mm long, as points 10 mm apart.
+/// let bar = |i: i32, j: i32| Point3::new(f64::from(i), f64::from(j), 0.0) / 100.0;
+/// let points: Vec<Point3<f64>> = (0..=16)
+///     .flat_map(|i| (0..=4).flat_map(move |j| [bar(i, j), bar(j, i)]))
+///     .collect();
+/// let found = decompose_points(&points, &DecomposeOptions::default())?;
+/// assert_eq!(found.boxes.len(), 2);
+/// assert!(points.iter().all(|p| found.boxes.iter().any(|b| b.contains(p, 1e-12))));
+/// # Ok::<(), prehend_geometry::GeometryError>(())
+/// ```
+pub fn decompose_points(
+    points: &[Point3<f64>],
+    options: &DecomposeOptions,
+) -> Result<Decomposition, GeometryError> {
+    options.check()?;
+    boxes_of(&Body::of_points(points, options)?, options)
+}
+
+fn boxes_of(body: &Body, options: &DecomposeOptions) -> Result<Decomposition, GeometryError> {
     match options.method {
-        DecomposeMethod::FitAndSplit => fit_and_split(mesh, options),
-        DecomposeMethod::Refined { .. } | DecomposeMethod::Exactly { .. } => refine(mesh, options),
+        DecomposeMethod::FitAndSplit => fit_and_split(body, options),
+        DecomposeMethod::Refined { .. } | DecomposeMethod::Exactly { .. } => refine(body, options),
     }
 }

@@ -81,7 +81,9 @@ mod write_ply;
 pub use box_record::BoxRecord;
 pub use collider::{Ball, Collider};
 pub use contact_point::ContactPoint;
-pub use decompose::{DecomposeMethod, DecomposeOptions, Decomposition, TreeNode, decompose};
+pub use decompose::{
+    DecomposeMethod, DecomposeOptions, Decomposition, TreeNode, decompose, decompose_points,
+};
 pub use enclosed_volume::{EnclosedVolume, VolumeMethod, enclosed_volume};
 pub use enclosure::largest_tetrahedron;
 pub use error::GeometryError;

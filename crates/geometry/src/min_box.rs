@@ -1,10 +1,10 @@
 //! The smallest box around points, at any orientation.
 
-mod body;
+pub(crate) mod body;
 mod canonical;
 mod descent;
 mod linear_program;
-mod search;
+pub(crate) mod search;
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 

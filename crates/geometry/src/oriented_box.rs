@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::GeometryError;
+use crate::{GeometryError, TriMesh};
 
 /// A box at any orientation. Extents are full lengths (m), positive and finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,6 +105,31 @@ impl OrientedBox {
             let sign = Vector3::from_fn(|k, _| if i >> k & 1 == 1 { half[k] } else { -half[k] });
             self.center + self.axes * sign
         })
+    }
+
+    /// Triangles of the surface as indices of [`OrientedBox::corners`], outwards: two for each face, −x +x −y +y −z +z.
+    pub const TRIANGLES: [[u32; 3]; 12] = [
+        [0, 4, 6],
+        [0, 6, 2],
+        [1, 3, 7],
+        [1, 7, 5],
+        [0, 1, 5],
+        [0, 5, 4],
+        [2, 6, 7],
+        [2, 7, 3],
+        [0, 2, 3],
+        [0, 3, 1],
+        [4, 5, 7],
+        [4, 7, 6],
+    ];
+
+    /// The surface, closed and outwards.
+    ///
+    /// # Panics
+    ///
+    /// Where a corner lies beyond the largest number.
+    pub fn surface(&self) -> TriMesh {
+        TriMesh::new(self.corners().to_vec(), Self::TRIANGLES.to_vec()).expect("the corners are finite")
     }
 
     /// The corner with the least coordinate along every axis.

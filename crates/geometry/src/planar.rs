@@ -52,12 +52,13 @@ pub(crate) fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Visits the rectangle around a convex polygon that is flush with each of its edges: `visit(direction, area)`.
+/// Visits the rectangle around a convex polygon that is flush with each of its edges: `visit(direction, sides)`, the
+/// side along the direction first.
 ///
 /// `polygon` runs counter-clockwise and has at least three corners; `direction` is the edge's unit vector. The
 /// smallest rectangle of all is among them (Freeman and Shapira 1975). Takes time linear in the number of edges
 /// (rotating calipers, Toussaint 1983).
-pub(crate) fn flush_rectangles(polygon: &[[f64; 2]], mut visit: impl FnMut([f64; 2], f64)) {
+pub(crate) fn flush_rectangles(polygon: &[[f64; 2]], mut visit: impl FnMut([f64; 2], [f64; 2])) {
     let n = polygon.len();
     let next = |i: usize| if i + 1 == n { 0 } else { i + 1 };
     let dot = |d: [f64; 2], p: [f64; 2]| d[0] * p[0] + d[1] * p[1];
@@ -95,7 +96,7 @@ pub(crate) fn flush_rectangles(polygon: &[[f64; 2]], mut visit: impl FnMut([f64;
         }
         let width = dot(u, polygon[ahead]) - dot(u, polygon[behind]);
         let height = dot(v, polygon[aside]) - dot(v, p);
-        visit(u, width * height);
+        visit(u, [width, height]);
     }
 }
 
@@ -127,7 +128,9 @@ mod tests {
     #[test]
     fn flush_rectangles_of_a_triangle_have_twice_its_area() {
         let mut areas = Vec::new();
-        flush_rectangles(&[[0.0, 0.0], [4.0, 0.0], [1.0, 3.0]], |_, area| areas.push(area));
+        flush_rectangles(&[[0.0, 0.0], [4.0, 0.0], [1.0, 3.0]], |_, [w, h]| {
+            areas.push(w * h);
+        });
         assert_eq!(areas.len(), 3);
         assert!(areas.iter().all(|a| (a - 12.0).abs() < 1e-12), "{areas:?}");
     }
@@ -139,12 +142,12 @@ mod tests {
             .map(|a| [3.0 * a.cos() + 0.2 * a, a.sin()])
             .collect();
         let polygon: Vec<[f64; 2]> = planar_hull(&ring).iter().map(|&i| ring[i as usize]).collect();
-        flush_rectangles(&polygon, |u, area| {
+        flush_rectangles(&polygon, |u, [width, height]| {
             let span = |d: [f64; 2]| {
                 let values = polygon.iter().map(|p| d[0] * p[0] + d[1] * p[1]);
                 values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
             };
-            assert!((area - span(u) * span([-u[1], u[0]])).abs() < 1e-12);
+            assert!((width - span(u)).abs() < 1e-12 && (height - span([-u[1], u[0]])).abs() < 1e-12);
         });
     }
 }

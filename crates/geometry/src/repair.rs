@@ -264,28 +264,11 @@ fn count_referenced(mesh: &TriMesh) -> usize {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::{inspect, signed_volume};
+    use crate::{OrientedBox, inspect, signed_volume};
 
     /// A cube about the origin, closed and outward; faces in pairs of triangles, −x +x −y +y −z +z.
     pub(crate) fn cube(edge: f64) -> TriMesh {
-        let half = edge / 2.0;
-        let corner = |i: u32, k: u32| if i >> k & 1 == 1 { half } else { -half };
-        let vertices = (0..8)
-            .map(|i| Point3::new(corner(i, 0), corner(i, 1), corner(i, 2)))
-            .collect();
-        let quads = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .collect();
-        TriMesh::new(vertices, triangles).unwrap()
+        OrientedBox::centered([edge; 3]).surface()
     }
 
     fn turned(mesh: &TriMesh) -> TriMesh {

@@ -44,7 +44,10 @@ const MAX_DEPTH: usize = 64;
 
 impl WindingTree {
     pub(crate) fn new(mesh: &TriMesh) -> Self {
-        let mut triangles: Vec<_> = mesh.corners().collect();
+        Self::of(mesh.corners().collect())
+    }
+
+    pub(crate) fn of(mut triangles: Vec<[Point3<f64>; 3]>) -> Self {
         let mut groups = Vec::with_capacity(triangles.len() / 2);
         grow(&mut triangles, 0, &mut groups);
         Self { triangles, groups }

@@ -4,8 +4,8 @@ mod shapes;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use prehend_geometry::{
-    DecomposeMethod, DecomposeOptions, Decomposition, OrientedBox, TriMesh, decompose, minimum_volume_box,
-    signed_volume, union_volume,
+    DecomposeMethod, DecomposeOptions, Decomposition, OrientedBox, TriMesh, decompose, decompose_points,
+    minimum_volume_box, signed_volume, union_volume,
 };
 use proptest::prelude::*;
 use shapes::{bottle, boxes, hammer, mug};
@@ -110,6 +110,9 @@ fn assert_sound(found: &Decomposition, mesh: &TriMesh, solid: f64, options: &Dec
             );
         }
     }
+    if let DecomposeMethod::Refined { price } = options.method {
+        assert_pays_its_price(found, price);
+    }
     if options.method == DecomposeMethod::FitAndSplit {
         // Leaves in the order of the splits: the children of each took at least the gain off the total then.
         let mut splits: Vec<usize> = (0..found.tree.len())
@@ -134,6 +137,56 @@ fn assert_sound(found: &Decomposition, mesh: &TriMesh, solid: f64, options: &Dec
         let bound = 1.0 + found.cvex.ln() / (1.0 / options.gain).ln();
         assert!(found.boxes.len() as f64 <= bound + 1e-9);
     }
+}
+
+/// Every box of a refined decomposition takes its price off the union: so there are no more than 1 + 1 / price, and no
+/// two of them are better replaced by the box around both. Boxes are chosen by boxes found quickly, hence the margin.
+fn assert_pays_its_price(found: &Decomposition, price: f64) {
+    const QUICK: f64 = 0.01;
+    let root = found.root.volume();
+    let n = found.boxes.len();
+    let union = union_volume(&found.boxes) / root;
+    assert!(
+        n as f64 - 1.0 <= (1.0 + QUICK - union) / price,
+        "{n} boxes: {union}"
+    );
+    let is_leaf = |node: usize| found.tree[node].children.is_none();
+    let joins = found
+        .tree
+        .iter()
+        .filter(|n| n.children.is_some_and(|c| c.into_iter().all(is_leaf)));
+    for join in joins {
+        let children = join.children.unwrap_or_default().map(|c| found.tree[c].region);
+        let mut fewer: Vec<OrientedBox> = found
+            .boxes
+            .iter()
+            .filter(|b| !children.contains(b))
+            .copied()
+            .collect();
+        fewer.push(join.region);
+        let merged = union_volume(&fewer) / root;
+        assert!(
+            union + price <= merged + QUICK,
+            "two boxes that do not pay: {union} and {merged}"
+        );
+    }
+}
+
+#[test]
+fn cvex_is_the_papers_unless_another_method_is_asked_for() {
+    let mesh = mug();
+    let plain = decompose(&mesh, &DecomposeOptions::default()).unwrap();
+    assert_eq!(
+        plain,
+        decompose(&mesh, &with(DecomposeMethod::FitAndSplit)).unwrap()
+    );
+    let refined = decompose(&mesh, &with(DecomposeMethod::Refined { price: 0.02 })).unwrap();
+    assert!(
+        refined.cvex > 1.5 * plain.cvex,
+        "{} and {}",
+        refined.cvex,
+        plain.cvex
+    );
 }
 
 #[test]
@@ -250,6 +303,22 @@ proptest! {
         let options = with(METHODS[method]);
         let moved = mesh.transformed(&motion);
         assert_sound(&decompose(&moved, &options).unwrap(), &moved, solid, &options);
+    }
+
+    #[test]
+    fn any_cloud_is_covered_and_every_split_pays((mesh, _) in blocks(), motion in motion(), method in 0..3_usize) {
+        let options = with(METHODS[method]);
+        // Points 1/20 apart on the faces of the blocks.
+        let points: Vec<Point3<f64>> = mesh
+            .corners()
+            .flat_map(|[a, b, c]| {
+                let steps = (0..=20).flat_map(|i| (0..=20 - i).map(move |j| (f64::from(i) / 20.0, f64::from(j) / 20.0)));
+                steps.map(move |(s, t)| motion * (a + (b - a) * s + (c - a) * t))
+            })
+            .collect();
+        let found = decompose_points(&points, &options).unwrap();
+        let corners = (0..points.len() as u32).map(|i| [i; 3]).collect();
+        assert_sound(&found, &TriMesh::new(points, corners).unwrap(), 0.0, &options);
     }
 
     #[test]

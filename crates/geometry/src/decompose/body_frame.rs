@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
-use super::region::Plane;
-use crate::TriMesh;
+use super::region::{Plane, Region};
 
 /// Second moments that differ by less than this share of the largest belong to a body that is round about an axis.
 const ROUND: f64 = 1e-4;
@@ -28,9 +27,10 @@ pub(super) struct BodyFrame {
 }
 
 impl BodyFrame {
-    /// The frame of a mesh; none where all vertices that belong to a triangle coincide.
-    pub(super) fn of(mesh: &TriMesh) -> Option<Self> {
-        let used: Vec<Point3<f64>> = mesh.corners().flatten().collect();
+    /// The frame of a whole body; none where all its vertices coincide.
+    pub(super) fn of(body: &Region) -> Option<Self> {
+        let corners = body.triangles().iter().flatten();
+        let used: Vec<Point3<f64>> = corners.map(|&v| body.vertices()[v as usize]).collect();
         let first = *used.first()?;
         let reach = used.iter().map(|p| (p - first).norm()).fold(0.0, f64::max);
         if !(reach > 0.0 && reach.is_finite()) {
@@ -147,30 +147,14 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use crate::OrientedBox;
-
-    fn cuboid(extents: [f64; 3]) -> TriMesh {
-        let sides = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = sides
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        TriMesh::new(OrientedBox::centered(extents).corners().to_vec(), triangles).unwrap()
-    }
+    use crate::{OrientedBox, TriMesh};
 
     #[test]
     fn rounded_coordinates_do_not_depend_on_how_the_body_lies() {
         for extents in [[0.1, 0.2, 0.3], [0.2, 0.2, 0.3], [0.3, 0.3, 0.1], [1.0; 3]] {
-            let body = cuboid(extents);
+            let body = OrientedBox::centered(extents).surface();
             let coordinates = |mesh: &TriMesh| -> Vec<Point3<f64>> {
-                let frame = BodyFrame::of(mesh).unwrap();
+                let frame = BodyFrame::of(&Region::of_mesh(mesh)).unwrap();
                 mesh.vertices().iter().map(|p| frame.rounded(p)).collect()
             };
             let expected = coordinates(&body);
@@ -188,7 +172,6 @@ mod tests {
 
     #[test]
     fn a_point_has_no_frame() {
-        let point = TriMesh::new(vec![Point3::origin()], vec![[0, 0, 0]]).unwrap();
-        assert!(BodyFrame::of(&point).is_none());
+        assert!(BodyFrame::of(&Region::of_points(&[Point3::origin(); 2])).is_none());
     }
 }

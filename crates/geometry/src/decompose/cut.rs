@@ -6,7 +6,7 @@ use super::region::Region;
 use crate::OrientedBox;
 use crate::planar::turn;
 
-/// Steps that the neighbourhood of a promising cut is divided into, twice.
+/// Steps that the neighbourhood of a promising cut is divided into in each round.
 const N_REFINED: usize = 16;
 
 /// A cut that frees less than this share of a face sees no dent, only the corners of a polygonised curve.
@@ -26,12 +26,14 @@ pub(super) struct Cut {
 /// The promising cuts: of each image along each of its axes the one with the least α, where it sees a dent.
 ///
 /// In the order of axes and images, the first of equal places; those that free less than half as much as the best
-/// are left out. No cut takes off a slab thinner than `min_slab`.
+/// are left out. No cut takes off a slab thinner than `min_slab`. The place of each is looked for again, `n_rounds` times,
+/// between its neighbours.
 pub(super) fn promising_cuts(
     region: &Region,
     fitted: &OrientedBox,
     n_cells: usize,
     min_slab: f64,
+    n_rounds: usize,
 ) -> Vec<Cut> {
     let local: Vec<Vector3<f64>> = region.vertices().iter().map(|p| fitted.local(p)).collect();
     let extents = fitted.extents();
@@ -49,7 +51,7 @@ pub(super) fn promising_cuts(
             let face = extents[axis] * extents[side];
             let mut found = profile.most_freed(&places, image);
             let mut width = step;
-            for _ in 0..2 {
+            for _ in 0..n_rounds {
                 let (low, high) = (
                     (found.0 - width).max(slab - half),
                     (found.0 + width).min(half - slab),

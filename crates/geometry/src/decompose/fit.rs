@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
 use crate::OrientedBox;
 use crate::hull::hull_within;
-use crate::planar::planar_hull;
+use crate::min_box::body::{Body as ConvexBody, Scratch, perpendicular};
+use crate::min_box::search::largest_normals;
 
 /// How far inside the hull of the points the simplified hull may lie that directions are tried on; lengths are still
 /// those of all points.
@@ -21,7 +22,9 @@ const PREFERENCE: f64 = 1e-3;
 /// Points with their simplified hull, ready to be boxed.
 pub(super) struct Cloud {
     points: Vec<Point3<f64>>,
-    corners: Vec<Vector3<f64>>,
+    hull: ConvexBody,
+    /// Whether the hull has triangles; else it is a segment or a point.
+    has_faces: bool,
     facets: Vec<Vector3<f64>>,
 }
 
@@ -29,40 +32,30 @@ impl Cloud {
     /// `points` must not be empty.
     pub(super) fn new(points: Vec<Point3<f64>>) -> Self {
         let hull = hull_within(&points, SIMPLIFIED);
-        let mut facets: Vec<(f64, Vector3<f64>)> = hull
+        let area_vectors = hull
             .triangles()
             .iter()
             .map(|t| t.map(|v| hull.points()[v as usize]))
-            .map(|[a, b, c]| (b - a).cross(&(c - a)))
-            .filter_map(|n| Some((n.norm(), n.try_normalize(0.0)?)))
-            .collect();
-        facets.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut normals: Vec<Vector3<f64>> = Vec::new();
-        for (_, normal) in facets {
-            if normals.len() == N_FACETS {
-                break;
-            }
-            if normals.iter().all(|n| n.dot(&normal).abs() < 1.0 - 1e-4) {
-                normals.push(normal);
-            }
-        }
+            .map(|[a, b, c]| (b - a).cross(&(c - a)));
         let corners = hull.points().iter().map(|p| p.coords).collect();
         Self {
+            facets: largest_normals(area_vectors, N_FACETS),
+            hull: ConvexBody::new(corners, hull.triangles()),
+            has_faces: hull.rank() >= 2,
             points,
-            corners,
-            facets: normals,
         }
     }
 
-    /// The points that a box must hold, up to 1e-6 of their extent: corners of their hull.
-    pub(super) fn hull_corners(&self) -> Vec<Point3<f64>> {
-        hull_within(&self.points, 1e-6).points().to_vec()
+    /// Corners of the simplified hull.
+    pub(super) fn corners(&self) -> Vec<Point3<f64>> {
+        self.hull.points.iter().map(|&p| p.into()).collect()
     }
 
     /// The smaller of the boxes with one axis along one of `axes`; no extent is below `min_extent`.
     pub(super) fn rough_volume(&self, axes: &[Vector3<f64>], min_extent: f64) -> f64 {
+        let mut scratch = Scratch::default();
         axes.iter()
-            .map(|axis| self.best_about(axis, min_extent).1)
+            .map(|axis| self.best_about(axis, min_extent, &mut scratch).1)
             .fold(f64::INFINITY, f64::min)
     }
 
@@ -71,12 +64,13 @@ impl Cloud {
     pub(super) fn fit(&self, axes: &[Vector3<f64>; 3], min_extent: f64) -> OrientedBox {
         let given = Matrix3::from_columns(axes);
         let along_given = (given, self.volume_along(&given, min_extent));
+        let mut scratch = Scratch::default();
         let mut found: Vec<(Matrix3<f64>, f64)> = axes
             .iter()
             .chain(&self.facets)
             .copied()
             .chain(lattice())
-            .map(|d| self.best_about(&d, min_extent))
+            .map(|d| self.best_about(&d, min_extent, &mut scratch))
             .collect();
         let about_given = found[..3]
             .iter()
@@ -85,7 +79,7 @@ impl Cloud {
         found.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut best = found[0];
         for start in found.iter().take(N_STARTS) {
-            let settled = self.settle(*start, min_extent);
+            let settled = self.settle(*start, min_extent, &mut scratch);
             if settled.1 < best.1 {
                 best = settled;
             }
@@ -98,12 +92,17 @@ impl Cloud {
         self.around(&best.0, min_extent)
     }
 
-    fn settle(&self, start: (Matrix3<f64>, f64), min_extent: f64) -> (Matrix3<f64>, f64) {
+    fn settle(
+        &self,
+        start: (Matrix3<f64>, f64),
+        min_extent: f64,
+        scratch: &mut Scratch,
+    ) -> (Matrix3<f64>, f64) {
         let mut best = start;
         for _ in 0..MAX_ROUNDS {
             let (axes, before) = best;
             for k in 0..3 {
-                let found = self.best_about(&axes.column(k).into(), min_extent);
+                let found = self.best_about(&axes.column(k).into(), min_extent, scratch);
                 if found.1 < best.1 {
                     best = found;
                 }
@@ -116,38 +115,39 @@ impl Cloud {
     }
 
     /// The smallest box of the simplified hull with one axis along a unit vector: flush with an edge of the outline.
-    fn best_about(&self, axis: &Vector3<f64>, min_extent: f64) -> (Matrix3<f64>, f64) {
-        let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
-        let v = axis.cross(&u);
-        let flat: Vec<[f64; 2]> = self.corners.iter().map(|p| [u.dot(p), v.dot(p)]).collect();
-        let (low, high) = span(self.corners.iter().map(|p| axis.dot(p)));
-        let height = (high - low).max(min_extent);
-        let outline: Vec<[f64; 2]> = planar_hull(&flat).iter().map(|&i| flat[i as usize]).collect();
-        let mut best = (Matrix3::from_columns(&[*axis, u, v]), f64::INFINITY);
-        for (i, p) in outline.iter().enumerate() {
-            let q = outline[(i + 1) % outline.len()];
-            let length = (q[0] - p[0]).hypot(q[1] - p[1]);
-            let d = if length > 1e-9 {
-                [(q[0] - p[0]) / length, (q[1] - p[1]) / length]
-            } else if outline.len() < 3 {
-                [1.0, 0.0]
-            } else {
-                continue;
-            };
-            let (low, high) = span(outline.iter().map(|c| d[0] * c[0] + d[1] * c[1]));
-            let (near, far) = span(outline.iter().map(|c| d[0] * c[1] - d[1] * c[0]));
-            let volume = height * (high - low).max(min_extent) * (far - near).max(min_extent);
+    fn best_about(&self, axis: &Vector3<f64>, min_extent: f64, scratch: &mut Scratch) -> (Matrix3<f64>, f64) {
+        let mut best = (Matrix3::identity(), f64::INFINITY);
+        let mut consider = |axes: Matrix3<f64>, extents: Vector3<f64>| {
+            let volume = extents.map(|e| e.max(min_extent)).product();
             if volume < best.1 {
-                let along = u * d[0] + v * d[1];
-                best = (Matrix3::from_columns(&[*axis, along, axis.cross(&along)]), volume);
+                best = (axes, volume);
             }
+        };
+        if self.has_faces {
+            self.hull.extents_about(axis, scratch, &mut consider);
         }
-        best
+        if best.1.is_finite() {
+            return best;
+        }
+        // A segment, or a polygon seen edge-on: along the line through the corners that are seen farthest apart.
+        let (u, v) = perpendicular(axis);
+        let seen = |p: &Vector3<f64>| u * u.dot(p) + v * v.dot(p);
+        let far = |from: &Vector3<f64>| {
+            let distance = |p: &&Vector3<f64>| seen(&(*p - from)).norm_squared();
+            let farthest = |a, b| if distance(&b) > distance(&a) { b } else { a };
+            self.hull.points.iter().reduce(farthest)
+        };
+        let ends = far(&self.hull.points[0]).and_then(|p| Some((p, far(p)?)));
+        let along = ends
+            .and_then(|(p, q)| seen(&(q - p)).try_normalize(1e-12))
+            .unwrap_or(u);
+        let axes = Matrix3::from_columns(&[*axis, along, axis.cross(&along)]);
+        (axes, self.volume_along(&axes, min_extent))
     }
 
     fn volume_along(&self, axes: &Matrix3<f64>, min_extent: f64) -> f64 {
         (0..3)
-            .map(|k| span(self.corners.iter().map(|p| axes.column(k).dot(p))))
+            .map(|k| span(self.hull.points.iter().map(|p| axes.column(k).dot(p))))
             .map(|(low, high)| (high - low).max(min_extent))
             .product()
     }

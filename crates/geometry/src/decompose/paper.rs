@@ -5,29 +5,28 @@ use super::cut::promising_cuts;
 use super::fit::Cloud;
 use super::region::{Plane, Region};
 use super::{DecomposeOptions, Decomposition, TreeNode};
-use crate::{GeometryError, OrientedBox, TriMesh};
+use crate::{GeometryError, OrientedBox};
 
 /// Cuts whose halves are boxed with care, of those that look best with boxes about the axes of the whole.
 const N_CAREFUL: usize = 3;
+
+/// Rounds in which the place of a cut is found more closely.
+const N_ROUNDS: usize = 2;
 
 /// Smallest boxes are fitted to a split whose quickly found ones miss the gain by less than this.
 const QUICK_ERROR: f64 = 0.02;
 
 /// See [`super::decompose`].
-pub(super) fn fit_and_split(
-    mesh: &TriMesh,
-    options: &DecomposeOptions,
-) -> Result<Decomposition, GeometryError> {
-    let body = Body::new(mesh, options)?;
+pub(super) fn fit_and_split(body: &Body, options: &DecomposeOptions) -> Result<Decomposition, GeometryError> {
     let mut tree = vec![TreeNode {
         region: body.root,
         parent: None,
         children: None,
     }];
     let mut total = body.root.volume();
-    let mut leaves = vec![Leaf::new(&body, options, 0, body.whole(), body.quick_root)];
+    let mut leaves = vec![Leaf::new(body, options, 0, body.whole(), body.quick_root)];
     while leaves.len() < options.max_boxes {
-        let Some(best) = next_split(&body, options, &tree, &mut leaves, total)? else {
+        let Some(best) = next_split(body, options, &tree, &mut leaves, total)? else {
             break;
         };
         let leaf = leaves.swap_remove(best);
@@ -48,7 +47,7 @@ pub(super) fn fit_and_split(
         }
         tree[leaf.node].children = Some([tree.len(), tree.len() + 1]);
         for ((part, region), quick) in fitted.parts.into_iter().zip(fitted.boxes).zip(quick) {
-            leaves.push(Leaf::new(&body, options, tree.len(), part, quick));
+            leaves.push(Leaf::new(body, options, tree.len(), part, quick));
             tree.push(TreeNode {
                 region,
                 parent: Some(leaf.node),
@@ -142,13 +141,13 @@ fn best_cut(
 ) -> Option<Candidate> {
     let axes = [0, 1, 2].map(|k| fitted.axis(k));
     let mut tried: Vec<(f64, Plane, [Cloud; 2])> = Vec::new();
-    for cut in promising_cuts(region, fitted, options.n_cells, body.min_slab) {
+    for cut in promising_cuts(region, fitted, options.n_cells, body.min_slab, N_ROUNDS) {
         let plane = Plane {
             normal: axes[cut.axis],
             origin: fitted.center() + axes[cut.axis] * cut.position,
         };
         let sides = region.points_beside(&plane);
-        if sides.iter().any(Vec::is_empty) {
+        if sides.iter().any(|side| side.len() < body.min_points) {
             continue;
         }
         let clouds = sides.map(Cloud::new);

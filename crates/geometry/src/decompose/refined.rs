@@ -3,10 +3,11 @@
 mod candidates;
 mod groups;
 mod pieces;
+mod widths;
 
 use super::body::Body;
 use super::{DecomposeMethod, DecomposeOptions, Decomposition, TreeNode};
-use crate::{GeometryError, OrientedBox, TriMesh, union_volume};
+use crate::{GeometryError, OrientedBox, union_volume};
 use candidates::Candidates;
 use groups::{Group, Merges, agglomerate};
 use pieces::cut_finely;
@@ -15,9 +16,8 @@ use pieces::cut_finely;
 const N_PIECES: usize = 24;
 
 /// See [`super::DecomposeMethod`].
-pub(super) fn refine(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposition, GeometryError> {
-    let body = Body::new(mesh, options)?;
-    let candidates = Candidates::new(&body, options.n_cells);
+pub(super) fn refine(body: &Body, options: &DecomposeOptions) -> Result<Decomposition, GeometryError> {
+    let candidates = Candidates::new(body, options.n_cells);
     let most = options.max_boxes;
     let (n_pieces, wanted, price) = match options.method {
         DecomposeMethod::Exactly { boxes: 1 } => (1, Some(1), 0.0),
@@ -25,15 +25,15 @@ pub(super) fn refine(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decom
         DecomposeMethod::Refined { price } => (N_PIECES, None, price * body.quick_root.volume()),
         DecomposeMethod::FitAndSplit => (most, Some(most), 0.0),
     };
-    let pieces = cut_finely(&body, &candidates, n_pieces);
-    let merges = agglomerate(&body, pieces);
+    let pieces = cut_finely(body, &candidates, n_pieces);
+    let merges = agglomerate(body, pieces);
     let n_boxes = wanted.unwrap_or_else(|| best_count(&merges, most, price));
     let mut groups = merges.groups(n_boxes);
-    candidates.improve(&body, &mut groups);
+    candidates.improve(body, &mut groups);
     if wanted.is_none() {
-        groups = worth_their_price(&body, groups, price);
+        groups = worth_their_price(body, groups, price);
     }
-    in_a_tree(&body, groups)
+    in_a_tree(body, groups)
 }
 
 /// The number of boxes with the least union and price; the smaller of equals.

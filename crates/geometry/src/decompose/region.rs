@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::simplify::simplified;
+use super::whole::Whole;
 use crate::TriMesh;
 
 /// A plane through a point; the unit normal points above.
@@ -37,14 +39,45 @@ pub(super) struct Region {
 const ON_PLANE: f64 = 1e-12;
 
 impl Region {
-    /// The mesh, each of its vertices as `placed` has it.
-    pub(super) fn of_mesh(mesh: &TriMesh, placed: impl Fn(&Point3<f64>) -> Point3<f64>) -> Self {
+    /// The triangles of a mesh.
+    pub(super) fn of_mesh(mesh: &TriMesh) -> Self {
         let mut builder = Builder::new(mesh.vertices().len());
         for triangle in mesh.triangles() {
-            let corners = triangle.map(|v| builder.keep(v, &placed(&mesh.vertices()[v as usize])));
+            let corners = triangle.map(|v| builder.keep(v, &mesh.vertices()[v as usize]));
             builder.region.triangles.push(corners);
         }
         builder.region
+    }
+
+    /// Points without a surface: each of them is a triangle that has shrunk to it.
+    pub(super) fn of_points(points: &[Point3<f64>]) -> Self {
+        Self {
+            vertices: points.to_vec(),
+            triangles: (0..points.len() as u32).map(|i| [i; 3]).collect(),
+            planes: Vec::new(),
+            inner: Vec::new(),
+        }
+    }
+
+    /// The same, uncut, with about so many triangles at most.
+    pub(super) fn simplified(&self, n_triangles: usize) -> Self {
+        let (vertices, triangles) = simplified(&self.vertices, &self.triangles, n_triangles);
+        Self {
+            vertices,
+            triangles,
+            planes: Vec::new(),
+            inner: Vec::new(),
+        }
+    }
+
+    /// The same, uncut, with every vertex as `placed` has it.
+    pub(super) fn moved(&self, placed: impl Fn(&Point3<f64>) -> Point3<f64>) -> Self {
+        Self {
+            vertices: self.vertices.iter().map(placed).collect(),
+            triangles: self.triangles.clone(),
+            planes: Vec::new(),
+            inner: Vec::new(),
+        }
     }
 
     /// Several regions as one, for boxes and images; it forgets the planes, so cut the regions themselves.
@@ -127,7 +160,7 @@ impl Region {
     }
 
     /// The parts below and above a plane; triangles across it are clipped. `whole` is the body that this is part of.
-    pub(super) fn cut(&self, plane: &Plane, whole: &Self) -> [Self; 2] {
+    pub(super) fn cut(&self, plane: &Plane, whole: &Whole) -> [Self; 2] {
         let height = self.heights(plane);
         let n = self.vertices.len();
         let mut sides = [Builder::new(n), Builder::new(n)];
@@ -156,7 +189,7 @@ impl Region {
     }
 
     /// Where the plane meets two of the region's own inside the solid.
-    fn corners_on(&self, plane: &Plane, whole: &Self) -> Vec<Point3<f64>> {
+    fn corners_on(&self, plane: &Plane, whole: &Whole) -> Vec<Point3<f64>> {
         let mut corners = Vec::new();
         for (i, (first, _)) in self.planes.iter().enumerate() {
             for (second, _) in &self.planes[..i] {
@@ -176,39 +209,13 @@ impl Region {
                 let is_inside = self
                     .planes
                     .iter()
-                    .all(|(p, side)| side * p.height(&corner) >= -1e-9 * whole.reach());
-                if is_inside && whole.winds_around(&corner) {
+                    .all(|(p, side)| side * p.height(&corner) >= -1e-9 * whole.reach);
+                if is_inside && whole.holds(&corner) {
                     corners.push(corner);
                 }
             }
         }
         corners
-    }
-
-    fn reach(&self) -> f64 {
-        let first = self.vertices[0];
-        self.vertices
-            .iter()
-            .map(|p| (p - first).amax())
-            .fold(0.0, f64::max)
-    }
-
-    /// Whether the surface winds around a point at least half: for a closed surface, whether the point is inside.
-    ///
-    /// Sum of the solid angles of the triangles (van Oosterom and Strackee 1983), which holes and loose parts disturb
-    /// only in proportion to their size (Jacobson, Kavan, Sorkine-Hornung 2013).
-    fn winds_around(&self, p: &Point3<f64>) -> bool {
-        let angle: f64 = self
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(|v| self.vertices[v as usize] - p);
-                let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
-                let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-                2.0 * a.dot(&b.cross(&c)).atan2(below)
-            })
-            .sum();
-        angle.abs() >= std::f64::consts::TAU
     }
 
     fn keep_whole(&self, triangle: [u32; 3], side: &mut Builder) {
@@ -308,15 +315,15 @@ mod tests {
     fn the_parts_of_a_cut_have_the_area_of_the_whole() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(Point3::from);
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]).unwrap();
-        let whole = Region::of_mesh(&mesh, |p| *p);
+        let whole = Whole::new(Region::of_mesh(&mesh));
         let normal = Vector3::new(1.0, 2.0, 3.0).normalize();
         for position in [0.1, 0.5, 1.0] {
             let plane = Plane {
                 normal,
                 origin: (normal * position).into(),
             };
-            let [below, above] = whole.cut(&plane, &whole);
-            assert!((area(&below) + area(&above) - area(&whole)).abs() < 1e-12);
+            let [below, above] = whole.region.cut(&plane, &whole);
+            assert!((area(&below) + area(&above) - area(&whole.region)).abs() < 1e-12);
             assert!(
                 below
                     .vertices
@@ -335,12 +342,13 @@ mod tests {
     #[test]
     fn a_cut_beside_the_body_leaves_one_part_empty() {
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Point3::from);
-        let whole = Region::of_mesh(&TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap(), |p| *p);
+        let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+        let whole = Whole::new(Region::of_mesh(&mesh));
         let plane = Plane {
             normal: Vector3::x(),
             origin: Point3::new(2.0, 0.0, 0.0),
         };
-        let [below, above] = whole.cut(&plane, &whole);
+        let [below, above] = whole.region.cut(&plane, &whole);
         assert!(!below.is_empty() && above.is_empty());
     }
 }

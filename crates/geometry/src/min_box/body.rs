@@ -18,8 +18,8 @@ const TILT: f64 = 1e-7;
 const CROSS_ROUNDING: f64 = 1e-15;
 
 /// A convex body of a size near 1, ready to be measured in many directions.
-pub(super) struct Body {
-    pub(super) points: Vec<Vector3<f64>>,
+pub(crate) struct Body {
+    pub(crate) points: Vec<Vector3<f64>>,
     /// Neighbours of corner `i` are `neighbours[first[i]..first[i + 1]]`.
     first: Vec<u32>,
     neighbours: Vec<u32>,
@@ -27,7 +27,7 @@ pub(super) struct Body {
 
 /// Memory that measuring uses again and again.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(crate) struct Scratch {
     outline: Vec<[f64; 2]>,
     flat: Vec<[f64; 2]>,
     order: Vec<u32>,
@@ -36,7 +36,7 @@ pub(super) struct Scratch {
 
 impl Body {
     /// `triangles` form a closed surface, outwards.
-    pub(super) fn new(points: Vec<Vector3<f64>>, triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(points: Vec<Vector3<f64>>, triangles: &[[u32; 3]]) -> Self {
         // On a closed surface every edge runs once in each direction.
         let directed = || triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let mut first = vec![0_u32; points.len() + 1];
@@ -114,6 +114,21 @@ impl Body {
         scratch: &mut Scratch,
         mut visit: impl FnMut(Candidate),
     ) {
+        self.extents_about(axis, scratch, |axes, extents| {
+            visit(Candidate {
+                axes,
+                size: extents.product(),
+            });
+        });
+    }
+
+    /// As [`Body::boxes_about`]: `visit(axes, extents)`, `axis` the first of the axes.
+    pub(crate) fn extents_about(
+        &self,
+        axis: &Vector3<f64>,
+        scratch: &mut Scratch,
+        mut visit: impl FnMut(Matrix3<f64>, Vector3<f64>),
+    ) {
         // Axes are handed on from box to box: without this their rounding would grow.
         let axis = &axis.normalize();
         let (u, v) = perpendicular(axis);
@@ -123,11 +138,10 @@ impl Body {
         if !self.walk_outline(&u, &v, &mut scratch.outline) {
             self.project(&u, &v, scratch);
         }
-        flush_rectangles(&scratch.outline, |d, area| {
+        flush_rectangles(&scratch.outline, |d, [width, height]| {
             let along = u * d[0] + v * d[1];
             let axes = Matrix3::from_columns(&[*axis, along, axis.cross(&along)]);
-            let size = area * depth;
-            visit(Candidate { axes, size });
+            visit(axes, Vector3::new(depth, width, height));
         });
     }
 
@@ -222,7 +236,7 @@ impl Body {
 }
 
 /// Two unit vectors that complete `axis` to a right-handed frame.
-pub(super) fn perpendicular(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+pub(crate) fn perpendicular(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
     (u, axis.cross(&u).normalize())
 }

@@ -79,11 +79,11 @@ pub(super) fn flat(hull: &UnitHull) -> Vec<Candidate> {
     let plane: Vec<[f64; 2]> = hull.points.iter().map(|p| [u.dot(p), v.dot(p)]).collect();
     let polygon: Vec<[f64; 2]> = planar_hull(&plane).iter().map(|&i| plane[i as usize]).collect();
     let mut candidates = Vec::new();
-    flush_rectangles(&polygon, |d, size| {
+    flush_rectangles(&polygon, |d, [width, height]| {
         let along = u * d[0] + v * d[1];
         candidates.push(Candidate {
             axes: Matrix3::from_columns(&[normal, along, normal.cross(&along)]),
-            size,
+            size: width * height,
         });
     });
     if normal.amax() >= 1.0 - 1e-15 {
@@ -106,7 +106,8 @@ pub(super) fn solid(hull: &UnitHull, hints: &[Vector3<f64>]) -> Vec<Candidate> {
     let mut scratch = Scratch::default();
     let frame = own_frame(hull);
     let mut directions: Vec<Vector3<f64>> = hints.to_vec();
-    directions.extend(facet_normals(hull));
+    let area_vectors = hull.triangles.iter().map(|t| hull.area_vector(t));
+    directions.extend(largest_normals(area_vectors, N_FACETS));
     directions.extend(lattice().map(|d| frame * d));
     if hull.points.len() <= SMALL_HULL {
         directions.extend(edge_normals(hull));
@@ -160,18 +161,18 @@ fn is_near(a: &Candidate, b: &Candidate) -> bool {
     (0..3).all(|k| cosines.column(k).max() > 0.9986)
 }
 
-/// Unit normals of the largest facets, leaving out nearly parallel ones.
-fn facet_normals(hull: &UnitHull) -> Vec<Vector3<f64>> {
-    let mut facets: Vec<(f64, Vector3<f64>)> = hull
-        .triangles
-        .iter()
-        .map(|t| hull.area_vector(t))
+/// Unit normals of the `n` largest facets with these area vectors, leaving out nearly parallel ones.
+pub(crate) fn largest_normals(
+    area_vectors: impl Iterator<Item = Vector3<f64>>,
+    n: usize,
+) -> Vec<Vector3<f64>> {
+    let mut facets: Vec<(f64, Vector3<f64>)> = area_vectors
         .filter_map(|n| Some((n.norm(), n.try_normalize(0.0)?)))
         .collect();
     facets.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut normals: Vec<Vector3<f64>> = Vec::new();
     for (_, normal) in facets {
-        if normals.len() == N_FACETS {
+        if normals.len() == n {
             break;
         }
         if normals.iter().all(|n| n.dot(&normal).abs() < 1.0 - 1e-4) {

@@ -1,25 +1,29 @@
 //! Planes that a piece may be cut at, and what they leave.
 
-use nalgebra::{Point3, Rotation3, Unit, Vector3};
+use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::groups::Group;
+use super::widths::{Widths, spread};
 use crate::OrientedBox;
 use crate::decompose::body::Body;
 use crate::decompose::cut::promising_cuts;
 use crate::decompose::fit::Cloud;
 use crate::decompose::region::{Plane, Region};
 
-/// Planes of facets at concave edges that are kept for a body, and tried for a piece.
-const N_CONCAVE: usize = 32;
-const N_CONCAVE_TRIED: usize = 4;
-/// Cuts that are tried of those seen from the box's own faces, and from each turned box.
+/// Planes of facets at concave edges that are kept for a body.
+const N_CONCAVE: usize = 16;
+/// Cuts that are tried of those seen from the box's own faces, and from each turned box; places tried close to each.
 const N_SEEN: [usize; 2] = [4, 1];
+const N_NEAR: usize = 9;
+/// Planes whose sides are boxed, of those that look best by sampled boxes; rounds in which each is moved to its best.
+const N_TRIED: usize = 5;
+const N_ROUNDS: usize = 3;
 /// An edge is concave where its facets turn inwards by more than this (sine of the angle).
 const CONCAVE: f64 = 0.2;
 /// Cuts whose halves are boxed with care.
 const N_CAREFUL: usize = 2;
-/// Places tried when a cut is moved, and how far to either side, relative to the extent along its normal.
-const N_SLIDES: usize = 8;
+/// Places tried in each round when a cut is moved, and how far to either side, relative to the extent along its normal.
+const N_SLIDES: usize = 12;
 const SLIDE: f64 = 0.08;
 /// Pairs of boxes that are cut anew at most, and the least share of their volume that counts as better.
 const N_RECUTS: usize = 48;
@@ -48,20 +52,28 @@ impl Candidates {
     pub(super) fn new(body: &Body, n_cells: usize) -> Self {
         Self {
             n_cells: n_cells.div_ceil(2).max(4),
-            concave: planes_at_concave_edges(body.thought()),
+            concave: planes_at_concave_edges(&body.thought().region),
         }
     }
 
     /// The cut of a region that leaves the least volume.
     ///
     /// Candidates are the middles of the box, the best places of the images on its faces and on faces turned by 45°,
-    /// and facets at concave edges.
-    pub(super) fn best(&self, body: &Body, region: &Region, fitted: &OrientedBox) -> Option<Halves> {
+    /// facets at concave edges and, where `sweeping`, all planes across the axes or halfway between two of them. What
+    /// looks best by sampled boxes is boxed with care.
+    pub(super) fn best(
+        &self,
+        body: &Body,
+        region: &Region,
+        fitted: &OrientedBox,
+        sweeping: bool,
+    ) -> Option<Halves> {
         let axes = [0, 1, 2].map(|k| fitted.axis(k));
+        let widths = Widths::new(region, &axes, body.min_extent);
         let mut tried: Vec<(f64, Plane, [Cloud; 2])> = Vec::new();
-        for plane in self.planes(body, region, fitted) {
+        for plane in self.planes(body, region, fitted, &widths, sweeping) {
             let sides = region.points_beside(&plane);
-            if sides.iter().any(|side| side.len() < 3) {
+            if sides.iter().any(|side| side.len() < body.min_points.max(3)) {
                 continue;
             }
             let clouds = sides.map(Cloud::new);
@@ -87,44 +99,85 @@ impl Candidates {
         best
     }
 
-    fn planes(&self, body: &Body, region: &Region, fitted: &OrientedBox) -> Vec<Plane> {
-        let mut planes: Vec<Plane> = Vec::new();
-        let mut add = |normal: Vector3<f64>, origin: Point3<f64>| {
-            let is_known = |p: &Plane| {
-                p.normal.dot(&normal).abs() > 0.9999
-                    && p.normal.dot(&(origin - p.origin)).abs() < 0.2 * body.min_slab
-            };
-            if !planes.iter().any(is_known) {
-                planes.push(Plane { normal, origin });
-            }
+    /// The least volume that some swept plane leaves, by sampled boxes.
+    pub(super) fn least_volume(&self, body: &Body, region: &Region, fitted: &OrientedBox) -> f64 {
+        let axes = [0, 1, 2].map(|k| fitted.axis(k));
+        let widths = Widths::new(region, &axes, body.min_extent);
+        let swept = self.swept(body, &widths, 1);
+        swept
+            .iter()
+            .map(|(volume, _)| *volume)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// The best planes, by sampled boxes.
+    fn planes(
+        &self,
+        body: &Body,
+        region: &Region,
+        fitted: &OrientedBox,
+        widths: &Widths,
+        sweeping: bool,
+    ) -> Vec<Plane> {
+        let mut found = if sweeping {
+            self.swept(body, widths, N_ROUNDS)
+        } else {
+            Vec::new()
         };
         for around in [None, Some(0), Some(1), Some(2)] {
-            let seen_from = match around {
-                None => *fitted,
-                Some(axis) => turned(region, fitted, axis),
-            };
-            let mut cuts = promising_cuts(region, &seen_from, self.n_cells, body.min_slab);
+            let seen_from = around.map_or(*fitted, |axis| turned(region, fitted, axis));
+            let mut cuts = promising_cuts(region, &seen_from, self.n_cells, body.min_slab, 0);
             cuts.sort_by(|a, b| b.freed.total_cmp(&a.freed));
             for cut in cuts.into_iter().take(N_SEEN[usize::from(around.is_some())]) {
                 let normal = seen_from.axis(cut.axis);
-                add(normal, seen_from.center() + normal * cut.position);
+                let here = normal.dot(&seen_from.center().coords) + cut.position;
+                let step = seen_from.extents()[cut.axis] / self.n_cells as f64;
+                let (place, volume) = widths.best_place(&normal, (here - step, here + step), N_NEAR, 2);
+                let origin = (normal * place).into();
+                found.push((volume, Plane { normal, origin }));
             }
         }
         for k in (0..3).filter(|&k| fitted.extents()[k] > 2.0 * body.min_slab) {
-            add(fitted.axis(k), fitted.center());
+            let plane = Plane {
+                normal: fitted.axis(k),
+                origin: fitted.center(),
+            };
+            found.push((widths.volume_beside(&plane), plane));
         }
         let fits = |plane: &&Plane| {
-            let heights = region
-                .vertices()
-                .iter()
-                .map(|p| plane.normal.dot(&(p - plane.origin)));
-            let (low, high) = heights.fold((0.0_f64, 0.0_f64), |(low, high), h| (low.min(h), high.max(h)));
-            low < -body.min_slab && high > body.min_slab
+            let (low, high) = widths.span(&plane.normal);
+            let place = plane.normal.dot(&plane.origin.coords);
+            low < place - body.min_slab && high > place + body.min_slab
         };
-        for plane in self.concave.iter().filter(fits).take(N_CONCAVE_TRIED) {
-            add(plane.normal, plane.origin);
+        let concave = self.concave.iter().filter(fits);
+        found.extend(concave.map(|plane| (widths.volume_beside(plane), *plane)));
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut planes: Vec<Plane> = Vec::new();
+        for (_, plane) in found {
+            let is_known = |p: &Plane| {
+                p.normal.dot(&plane.normal).abs() > 0.9999
+                    && p.normal.dot(&(plane.origin - p.origin)).abs() < 0.2 * body.min_slab
+            };
+            if planes.len() < N_TRIED && !planes.iter().any(is_known) {
+                planes.push(plane);
+            }
         }
         planes
+    }
+
+    /// The best plane of each swept normal, with the volume on both sides.
+    fn swept(&self, body: &Body, widths: &Widths, n_rounds: usize) -> Vec<(f64, Plane)> {
+        let mut found = Vec::new();
+        for normal in widths.normals() {
+            let (low, high) = widths.span(&normal);
+            let range = (low + body.min_slab, high - body.min_slab);
+            if range.0 < range.1 {
+                let (place, volume) = widths.best_place(&normal, range, self.n_cells, n_rounds);
+                let origin = (normal * place).into();
+                found.push((volume, Plane { normal, origin }));
+            }
+        }
+        found
     }
 
     /// Cuts neighbouring groups anew, two at a time, largest first, where that leaves less volume.
@@ -150,7 +203,7 @@ impl Candidates {
             let both = Group::joined(body, &groups[i], &groups[j]);
             let region = both.region();
             let halves = self
-                .best(body, &region, &both.fitted)
+                .best(body, &region, &both.fitted, true)
                 .map(|found| slide(body, &region, found));
             let Some(halves) = halves.filter(|h| h.volume() < volume * (1.0 - BETTER)) else {
                 continue;
@@ -166,64 +219,47 @@ impl Candidates {
     }
 }
 
-/// Moves a plane along its normal to where the two boxes are smallest, by golden section.
+/// Moves a plane along its normal to where the boxes with the axes of its two are smallest.
 fn slide(body: &Body, region: &Region, found: Halves) -> Halves {
     let normal = found.plane.normal;
-    let heights = region
-        .vertices()
-        .iter()
-        .map(|p| normal.dot(&(p - found.plane.origin)));
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-        (l.min(x), h.max(x))
-    });
-    let reach = SLIDE * (high - low);
-    let (mut from, mut to) = (
-        (low + body.min_slab).max(-reach),
-        (high - body.min_slab).min(reach),
-    );
     let axes = found.boxes.map(|b| [0, 1, 2].map(|k| b.axis(k)));
-    let sides_at = |shift: f64| {
-        let plane = Plane {
-            normal,
-            origin: found.plane.origin + normal * shift,
-        };
-        let sides = region.points_beside(&plane);
-        let has_points = sides.iter().all(|side| side.len() >= 3);
-        has_points.then(|| (plane, sides.map(Cloud::new)))
-    };
-    let mut best = (f64::INFINITY, 0.0);
-    let mut at = |shift: f64| {
-        let rough = |(_, clouds): (Plane, [Cloud; 2])| -> f64 {
-            let sides = clouds.iter().zip(&axes);
-            sides
-                .map(|(cloud, axes)| cloud.rough_volume(axes, body.min_extent))
-                .sum()
-        };
-        let volume = sides_at(shift).map_or(f64::INFINITY, rough);
-        if volume < best.0 {
-            best = (volume, shift);
-        }
-        volume
-    };
-    if from < to {
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let (mut left, mut right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
-        let (mut at_left, mut at_right) = (at(left), at(right));
-        for _ in 2..N_SLIDES {
-            if at_left <= at_right {
-                (to, right, at_right) = (right, left, at_left);
-                left = to - GOLDEN * (to - from);
-                at_left = at(left);
-            } else {
-                (from, left, at_left) = (left, right, at_right);
-                right = from + GOLDEN * (to - from);
-                at_right = at(right);
+    let [below, above] = axes
+        .each_ref()
+        .map(|axes| Widths::new(region, axes, body.min_extent));
+    let (low, high) = below.span(&normal);
+    let here = normal.dot(&found.plane.origin.coords);
+    let reach = SLIDE * (high - low);
+    let (from, to) = (
+        (low + body.min_slab).max(here - reach),
+        (high - body.min_slab).min(here + reach),
+    );
+    if from >= to {
+        return found;
+    }
+    let (mut best, mut range) = ((f64::INFINITY, here), (from, to));
+    for _ in 0..N_ROUNDS {
+        let places = spread(range.0, range.1, N_SLIDES);
+        let (left, right) = (
+            below.sides(&normal, &places).below,
+            above.sides(&normal, &places).above,
+        );
+        for ((&place, left), right) in places.iter().zip(left).zip(right) {
+            if left + right < best.0 {
+                best = (left + right, place);
             }
         }
+        let step = (range.1 - range.0) / (N_SLIDES - 1) as f64;
+        range = ((best.1 - step).max(from), (best.1 + step).min(to));
     }
-    let Some((plane, clouds)) = sides_at(best.1) else {
-        return found;
+    let plane = Plane {
+        normal,
+        origin: (normal * best.1).into(),
     };
+    let sides = region.points_beside(&plane);
+    if sides.iter().any(|side| side.len() < body.min_points.max(3)) {
+        return found;
+    }
+    let clouds = sides.map(Cloud::new);
     let fit = |side: usize| clouds[side].fit(&axes[side], body.min_extent);
     let moved = Halves {
         plane,

@@ -1,17 +1,19 @@
 //! Pieces that share a box, and merging them.
 
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+
 use super::candidates::Halves;
 use crate::OrientedBox;
 use crate::decompose::body::{Body, Part};
 use crate::decompose::fit::Cloud;
 use crate::decompose::region::Region;
 
-use nalgebra::{Point3, Vector3};
-
 /// Pieces and the quickly found box around them, in the body's own frame.
 #[derive(Clone)]
 pub(super) struct Group {
-    parts: Vec<Part>,
+    parts: Vec<Arc<Part>>,
     corners: Vec<Point3<f64>>,
     low: Vector3<f64>,
     high: Vector3<f64>,
@@ -20,11 +22,12 @@ pub(super) struct Group {
 
 impl Group {
     pub(super) fn new(parts: Vec<Part>, fitted: OrientedBox) -> Self {
+        let parts: Vec<Arc<Part>> = parts.into_iter().map(Arc::new).collect();
         let points: Vec<Point3<f64>> = parts.iter().flat_map(|p| p.thought.points()).collect();
-        Self::with(parts, Cloud::new(points).hull_corners(), fitted)
+        Self::with(parts, Cloud::new(points).corners(), fitted)
     }
 
-    fn with(parts: Vec<Part>, corners: Vec<Point3<f64>>, fitted: OrientedBox) -> Self {
+    fn with(parts: Vec<Arc<Part>>, corners: Vec<Point3<f64>>, fitted: OrientedBox) -> Self {
         let low = corners
             .iter()
             .fold(Vector3::repeat(f64::INFINITY), |low, p| low.inf(&p.coords));
@@ -45,12 +48,18 @@ impl Group {
         let parts = a.parts.iter().chain(&b.parts).cloned().collect();
         let cloud = Self::cloud(a, b);
         let fitted = Self::fit(body, &cloud, a, b);
-        Self::with(parts, cloud.hull_corners(), fitted)
+        Self::with(parts, cloud.corners(), fitted)
     }
 
-    /// The box around both.
-    fn joined_box(body: &Body, a: &Self, b: &Self) -> OrientedBox {
-        Self::fit(body, &Self::cloud(a, b), a, b)
+    /// Volume of the box around both; `rough`: of the smallest with an axis along one of theirs.
+    fn joined_volume(body: &Body, a: &Self, b: &Self, rough: bool) -> f64 {
+        let cloud = Self::cloud(a, b);
+        if rough {
+            let axes = [0, 1, 2].map(|k| [a.fitted.axis(k), b.fitted.axis(k)]);
+            cloud.rough_volume(axes.as_flattened(), body.min_extent)
+        } else {
+            Self::fit(body, &cloud, a, b).volume()
+        }
     }
 
     fn cloud(a: &Self, b: &Self) -> Cloud {
@@ -143,6 +152,16 @@ impl Merges {
     }
 }
 
+/// What merging two groups adds.
+#[derive(Clone, Copy)]
+struct Pair {
+    /// V(A ∪ B) − V(A) − V(B).
+    added: f64,
+    groups: [usize; 2],
+    /// Whether V(A ∪ B) is of a box quickly looked for; it may be smaller then.
+    is_rough: bool,
+}
+
 /// Merges the two groups whose common box adds the least, V(A ∪ B) − V(A) − V(B), again and again.
 ///
 /// Groups apart from all others are merged last.
@@ -151,37 +170,44 @@ pub(super) fn agglomerate(body: &Body, pieces: Vec<Group>) -> Merges {
     let mut groups = pieces;
     let mut sides = Vec::new();
     let mut open: Vec<usize> = (0..n_pieces).collect();
-    let mut pairs: Vec<(f64, [usize; 2])> = Vec::new();
-    let added = |groups: &[Group], i: usize, j: usize, apart: bool| {
-        let is_near = apart || groups[i].touches(&groups[j], 0.1 * body.min_slab);
-        is_near.then(|| {
-            let volume = Group::joined_box(body, &groups[i], &groups[j]).volume();
-            (
-                volume - groups[i].fitted.volume() - groups[j].fitted.volume(),
-                [i, j],
-            )
-        })
+    let measured = |groups: &[Group], [i, j]: [usize; 2], is_rough: bool| {
+        let [a, b] = [&groups[i], &groups[j]];
+        Pair {
+            added: Group::joined_volume(body, a, b, is_rough) - a.fitted.volume() - b.fitted.volume(),
+            groups: [i, j],
+            is_rough,
+        }
     };
+    let near = |groups: &[Group], i: usize, j: usize| {
+        let is_near = groups[i].touches(&groups[j], 0.1 * body.min_slab);
+        is_near.then(|| measured(groups, [i, j], true))
+    };
+    let mut pairs: Vec<Pair> = Vec::new();
     for i in 0..n_pieces {
-        pairs.extend((0..i).filter_map(|j| added(&groups, i, j, false)));
+        pairs.extend((0..i).filter_map(|j| near(&groups, i, j)));
     }
     while open.len() > 1 {
         if pairs.is_empty() {
-            let all = open.iter().flat_map(|&i| open.iter().map(move |&j| (i, j)));
+            let all = open.iter().flat_map(|&i| open.iter().map(move |&j| [i, j]));
             pairs.extend(
-                all.filter(|(i, j)| i > j)
-                    .filter_map(|(i, j)| added(&groups, i, j, true)),
+                all.filter(|[i, j]| i > j)
+                    .map(|pair| measured(&groups, pair, true)),
             );
         }
-        let least = pairs.iter().copied().reduce(|a, b| if b.0 < a.0 { b } else { a });
-        let Some((_, [i, j])) = least else { break };
+        let least = (0..pairs.len()).reduce(|a, b| if pairs[b].added < pairs[a].added { b } else { a });
+        let Some(least) = least else { break };
+        let [i, j] = pairs[least].groups;
+        if pairs[least].is_rough {
+            pairs[least] = measured(&groups, [i, j], false);
+            continue;
+        }
         let merged = Group::joined(body, &groups[i], &groups[j]);
-        pairs.retain(|(_, [a, b])| ![i, j].contains(a) && ![i, j].contains(b));
+        pairs.retain(|pair| !pair.groups.iter().any(|k| [i, j].contains(k)));
         open.retain(|&k| k != i && k != j);
         groups.push(merged);
         sides.push([i, j]);
         let new = groups.len() - 1;
-        pairs.extend(open.iter().filter_map(|&k| added(&groups, new, k, false)));
+        pairs.extend(open.iter().filter_map(|&k| near(&groups, new, k)));
         open.push(new);
     }
     Merges {
