@@ -188,6 +188,60 @@ fn a_cube_is_one_box_and_an_l_is_two() {
 }
 
 #[test]
+fn the_boxes_of_a_cloud_hold_its_points_and_the_answer_says_what_it_worked_on() {
+    let folder = tempfile::tempdir().unwrap();
+    // Points 0.1 apart on two bars that form an L.
+    let mut points = String::new();
+    for i in 0..=40 {
+        for j in 0..=10 {
+            for k in 0..=10 {
+                let _ = writeln!(
+                    points,
+                    "{} {} {}",
+                    f64::from(i) / 10.0,
+                    f64::from(j) / 10.0,
+                    f64::from(k) / 10.0
+                );
+                let _ = writeln!(
+                    points,
+                    "{} {} {}",
+                    f64::from(j) / 10.0,
+                    f64::from(i) / 10.0,
+                    f64::from(k) / 10.0
+                );
+            }
+        }
+    }
+    let cloud = put(folder.path(), "l.xyz", &points);
+    let mesh = put(
+        folder.path(),
+        "l.off",
+        &prism(&[[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4]]),
+    );
+    let lines = prehend(&["decompose", &cloud, &mesh, "--json"], "").lines();
+    assert_eq!(
+        (&lines[0]["shape"], &lines[1]["shape"]),
+        (&json!("cloud"), &json!("mesh"))
+    );
+    assert_eq!(lines[0]["boxes"].as_array().unwrap().len(), 2, "{}", lines[0]);
+    // A cut between two layers of points leaves the gap of 0.1 to neither side.
+    let ratio = number(&lines[0]["cvex"]) / number(&lines[1]["cvex"]);
+    assert!((0.999..1.04).contains(&ratio), "{ratio}");
+    let picture = folder.path().join("cloud.png");
+    let drawn = [
+        "decompose",
+        &cloud,
+        "--picture",
+        picture.to_str().unwrap(),
+        "--boxes",
+        "2",
+        "--json",
+    ];
+    assert_eq!(prehend(&drawn, "").answer()["boxes"].as_array().unwrap().len(), 2);
+    assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
 fn a_corner_tetrahedron_leaves_five_sixths_of_a_unit_cube() {
     let cube = r#"[{"center":[0.5,0.5,0.5],"axes":[[1,0,0],[0,1,0],[0,0,1]],"extents":[1,1,1]}]"#;
     let doubled = format!("[{0},{0}]", &cube[1..cube.len() - 1]);

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use nalgebra::Isometry3;
-use prehend::geometry::{DecomposeMethod, DecomposeOptions, Decomposition, TriMesh, decompose, union_volume};
-use prehend::report::{Camera, DisplayMesh, DrawOptions, Scene, View, draw, encode_png};
+use prehend::geometry::{
+    DecomposeMethod, DecomposeOptions, Decomposition, Shape, decompose, decompose_points, union_volume,
+};
+use prehend::report::{Camera, DisplayMesh, Dot, DrawOptions, Scene, View, draw, encode_png};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
@@ -17,6 +19,12 @@ use crate::output::{self, Outcome, Usage};
 /// Pixels along each side of a picture.
 const PICTURE: usize = 320;
 
+/// Dots in the picture of a cloud.
+const MAX_DOTS: usize = 4000;
+
+/// The object in a picture (sRGB).
+const GREY: [u8; 3] = [190, 190, 190];
+
 /// Boxes that an object is made of
 #[derive(clap::Args)]
 #[command(
@@ -25,7 +33,7 @@ const PICTURE: usize = 320;
                         prehend decompose objects/hammer/claw_hammer.ply --boxes 3 --picture boxes.png"
 )]
 pub struct Arguments {
-    /// .off .obj .stl .ply meshes
+    /// .off .obj .stl .ply .gltf .glb .dae meshes, .ply .xyz .pcd clouds
     #[arg(required = true)]
     files: Vec<PathBuf>,
 
@@ -95,19 +103,28 @@ impl Arguments {
     }
 
     fn boxes_of(&self, file: &Path) -> Result<Value> {
-        let (mesh, placement) = shape_input::read_mesh(file, &self.shape)?;
-        let result = decompose(&mesh, &self.options()).with_context(|| file.display().to_string())?;
+        let input = shape_input::read(file, &self.shape)?;
+        let options = self.options();
+        let found = match &input.shape {
+            Shape::Mesh(mesh) => decompose(mesh, &options),
+            Shape::Cloud(points) => decompose_points(points, &options),
+        };
+        let result = found.with_context(|| output::shown(file))?;
         if let Some(path) = &self.picture {
-            prehend::files::write(path, &picture(&mesh, &result)?)?;
+            prehend::files::write(path, &picture(&input.shape, &result)?)?;
         }
         let mut answer = json!({
+            "shape": match input.shape {
+                Shape::Mesh(_) => "mesh",
+                Shape::Cloud(_) => "cloud",
+            },
             "root": box_json(&result.root),
             "boxes": result.boxes.iter().map(box_json).collect::<Vec<_>>(),
             "cvex": result.cvex,
             "union_volume": union_volume(&result.boxes),
             "tree": result.tree,
         });
-        for (key, value) in placement.as_object().into_iter().flatten() {
+        for (key, value) in input.placement.as_object().into_iter().flatten() {
             answer[key] = value.clone();
         }
         Ok(answer)
@@ -130,8 +147,8 @@ impl Arguments {
     }
 }
 
-/// The object, seen obliquely, within its boxes.
-fn picture(mesh: &TriMesh, found: &Decomposition) -> Result<Vec<u8>> {
+/// The object (a cloud as dots), seen obliquely, within its boxes.
+fn picture(shape: &Shape, found: &Decomposition) -> Result<Vec<u8>> {
     const COLORS: [[u8; 3]; 6] = [
         [0, 114, 178],
         [213, 94, 0],
@@ -141,11 +158,18 @@ fn picture(mesh: &TriMesh, found: &Decomposition) -> Result<Vec<u8>> {
         [86, 180, 233],
     ];
     let mut scene = Scene::default();
-    scene.add(
-        &Arc::new(DisplayMesh::new(mesh)),
-        Isometry3::identity(),
-        [190, 190, 190],
-    );
+    match shape {
+        Shape::Mesh(mesh) => scene.add(&Arc::new(DisplayMesh::new(mesh)), Isometry3::identity(), GREY),
+        Shape::Cloud(points) => {
+            // Every so many of the points: more dots than these would hide one another.
+            let step = points.len().div_ceil(MAX_DOTS);
+            scene.dots.extend(points.iter().step_by(step).map(|&center| Dot {
+                center,
+                radius: 0.4,
+                color: GREY,
+            }));
+        }
+    }
     for (i, solid) in found.boxes.iter().enumerate() {
         scene.add_box(solid, COLORS[i % COLORS.len()]);
     }

@@ -218,19 +218,6 @@ fn format_of(path: &Path, options: &ShapeOptions) -> Result<MeshFormat> {
     })
 }
 
-/// A mesh, or an error where the file is a cloud.
-pub fn read_mesh(path: &Path, options: &ShapeOptions) -> Result<(TriMesh, Value)> {
-    let input = read(path, options)?;
-    match input.shape {
-        Shape::Mesh(mesh) => Ok((mesh, input.placement)),
-        Shape::Cloud(points) => anyhow::bail!(
-            "{}: is a cloud of {} points without triangles; this command needs a surface",
-            path.display(),
-            points.len()
-        ),
-    }
-}
-
 /// Files as names for answers.
 pub fn named(files: &[PathBuf]) -> impl Iterator<Item = (Value, PathBuf)> + '_ {
     files.iter().map(|f| (json!(f.to_string_lossy()), f.clone()))
