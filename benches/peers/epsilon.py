@@ -2,7 +2,8 @@
 
     cargo bench -p prehend-benches --bench epsilon && python3 benches/peers/epsilon.py
 
-Needs scipy (1.17 for the baseline). One thread; a set's time is the least of three hulls.
+Needs NumPy and SciPy: `python3 -m pip install numpy scipy==1.17.1` (the baseline's version). One thread; a set's time is the
+least of three hulls. The first argument is the file of inputs, the second: only every so many-th set of a kind is timed.
 """
 
 import json

@@ -1,9 +1,8 @@
 //! The epsilon quality: how small a push in the worst direction breaks the grasp.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
-
-use crate::polytope::{FacetId, Polytope};
+use crate::descent::descend;
+use crate::frontier::Frontier;
+use crate::growth::Growth;
 use crate::start::{Least, first_simplex};
 use crate::{Contact, GraspWrenchSpace, QualityError, QualityOptions, Wrench};
 
@@ -46,11 +45,12 @@ pub struct EpsilonBounds {
 ///
 /// ```text
 /// P ← a simplex of support points
+/// u ← offset of a facet of the space, found by going downhill from P       (ε ≤ u)
 /// loop: F ← facet of P with the least signed offset d from the origin, n its outward normal
-///       s ← max n · w over the whole space            (ε ≤ s, whatever P is)
+///       d ≥ u: ε = u                                  (ε ≥ d, since P lies inside)
+///       s ← max n · w over the whole space, u ← min(u, s)   (ε ≤ s, whatever P is)
 ///       s ≤ 0: the origin is not inside, ε = 0
-///       s = d: no point lies beyond F, so ε = d       (ε ≥ d, since P lies inside)
-///       else add the point of s to P
+///       add the point of s to P; facets farther out than u are never made
 /// ```
 ///
 /// A few dozen points decide; the whole hull, thousands of facets, is never built. Exact to 1e-12 of the largest wrench
@@ -59,7 +59,8 @@ pub struct EpsilonBounds {
 /// stops the rest.
 #[derive(Debug, Clone, Default)]
 pub struct EpsilonSolver {
-    growth: Growth<6>,
+    frontier: Frontier,
+    whole: Whole,
     space: Option<GraspWrenchSpace>,
 }
 
@@ -152,21 +153,25 @@ impl EpsilonSolver {
         let scaled = bound / space.largest_norm();
         let goal = Goal {
             too_little: (scaled - tolerance).max(FORCE_CLOSURE_TOLERANCE),
-            enough: scaled - tolerance,
-            tolerance,
+            enough: scaled,
+            tolerance: 0.5 * tolerance,
         };
         let bounds = self.solve(space, &goal)?;
         Ok(bounds.lower >= bound - tolerance * space.largest_norm())
     }
 
     fn solve(&mut self, space: &GraspWrenchSpace, goal: &Goal) -> Result<EpsilonBounds, QualityError> {
-        let (lower, least) = match space.n_axes() {
-            2 => Growth::<2>::default().run(space, goal),
-            3 => Growth::<3>::default().run(space, goal),
-            4 => Growth::<4>::default().run(space, goal),
-            5 => Growth::<5>::default().run(space, goal),
-            _ => self.growth.run(space, goal),
-        }?;
+        let tolerance = TOLERANCE * space.scaled_size();
+        let mut least = Least::new();
+        let lower = if let Some(simplex) = first_simplex(space, &mut least, goal.too_little, tolerance) {
+            self.grow(space, &simplex, goal, &mut least)?
+        } else {
+            // A flat space reaches nowhere along its normal, whatever was seen of it.
+            if least.reach > goal.too_little {
+                least.reach = 0.0;
+            }
+            0.0
+        };
         let size = space.largest_norm();
         let closed = least.reach > FORCE_CLOSURE_TOLERANCE;
         Ok(EpsilonBounds {
@@ -175,17 +180,83 @@ impl EpsilonSolver {
             limiting_wrench: -space.coordinates().wrench(&least.direction),
         })
     }
+
+    /// Grows a polytope from a simplex until the goal is met: a lower bound, and `least` the upper one.
+    fn grow(
+        &mut self,
+        space: &GraspWrenchSpace,
+        simplex: &[[f64; 6]; 7],
+        goal: &Goal,
+        least: &mut Least,
+    ) -> Result<f64, QualityError> {
+        let seen_tolerance = SEEN_TOLERANCE * space.scaled_size();
+        let n_axes = space.n_axes();
+        if !self.frontier.reset(&simplex[..=n_axes], seen_tolerance) {
+            least.reach = 0.0;
+            return Ok(0.0);
+        }
+        descend(space, simplex, &self.frontier, goal, least);
+        loop {
+            // Facets that reach this far need not be looked at.
+            let radius = (least.reach - goal.tolerance).min(goal.enough);
+            let Some((facet, offset)) = self.frontier.nearest().filter(|(_, offset)| *offset < radius) else {
+                return Ok(radius);
+            };
+            if least.reach <= goal.too_little {
+                return Ok(offset);
+            }
+            if self.frontier.n_facets() > MOST_FACETS || self.frontier.n_points() >= usize::from(u16::MAX) {
+                return Err(QualityError::TooManyFacets {
+                    what: "epsilon",
+                    facets: MOST_FACETS,
+                });
+            }
+            let plane = self.frontier.plane(facet);
+            let (reach, point) = space.scaled_support(&plane.normal);
+            least.see(reach, &plane.normal);
+            if least.reach <= goal.too_little {
+                return Ok(offset);
+            }
+            let radius = (least.reach - goal.tolerance).min(goal.enough);
+            let new = plane.height(&point) > seen_tolerance && !self.frontier.has_point(&point);
+            if offset < radius && (!new || self.frontier.insert(&point, radius).is_err()) {
+                return self.whole.run(space, simplex, goal, least);
+            }
+        }
+    }
+}
+
+/// Polytopes with their whole boundary, for each number of axes.
+#[derive(Debug, Clone, Default)]
+struct Whole(Growth<2>, Growth<3>, Growth<4>, Growth<5>, Growth<6>);
+
+impl Whole {
+    fn run(
+        &mut self,
+        space: &GraspWrenchSpace,
+        simplex: &[[f64; 6]; 7],
+        goal: &Goal,
+        least: &mut Least,
+    ) -> Result<f64, QualityError> {
+        match space.n_axes() {
+            2 => self.0.run(space, simplex, goal, least),
+            3 => self.1.run(space, simplex, goal, least),
+            4 => self.2.run(space, simplex, goal, least),
+            5 => self.3.run(space, simplex, goal, least),
+            _ => self.4.run(space, simplex, goal, least),
+        }
+    }
 }
 
 /// When to stop, in scaled units.
 #[derive(Debug, Clone, Copy)]
-struct Goal {
+pub(crate) struct Goal {
     /// ε is known not to exceed this.
-    too_little: f64,
+    pub(crate) too_little: f64,
     /// ε is known to reach this.
-    enough: f64,
+    pub(crate) enough: f64,
     /// The bounds are this near.
-    tolerance: f64,
+    pub(crate) tolerance: f64,
 }
 
 impl Goal {
@@ -203,124 +274,7 @@ pub(crate) const TOLERANCE: f64 = 1e-12;
 /// A facet sees a point that is higher than this; well below `TOLERANCE`, so that a facet that asks for a point sees it.
 pub(crate) const SEEN_TOLERANCE: f64 = 1e-13;
 /// More facets than any sensible grasp asks for (200 contacts: a few thousand); bounds time and memory.
-const MOST_FACETS: usize = 400_000;
-
-/// The polytope inside the space and its facets in the order of their distance.
-#[derive(Debug, Clone, Default)]
-struct Growth<const D: usize> {
-    polytope: Polytope<D>,
-    queue: BinaryHeap<Reverse<Candidate>>,
-}
-
-impl<const D: usize> Growth<D> {
-    /// A lower bound, and the direction of the least upper bound.
-    fn run(&mut self, space: &GraspWrenchSpace, goal: &Goal) -> Result<(f64, Least), QualityError> {
-        let flat = TOLERANCE * space.scaled_size();
-        let mut least = Least::new();
-        let simplex = first_simplex(space, &mut least, goal.too_little, flat);
-        let started = simplex.is_some_and(|simplex| {
-            let simplex = simplex.map(|p| shorter(&p));
-            self.polytope
-                .reset(&simplex[..=D], SEEN_TOLERANCE * space.scaled_size())
-        });
-        if !started {
-            // A flat space reaches nowhere along its normal, whatever was seen of it.
-            if least.reach > goal.too_little {
-                least.reach = 0.0;
-            }
-            return Ok((0.0, least));
-        }
-        self.queue.clear();
-        self.queue_created(least.reach);
-        // Facets whose rounding cannot be mended keep the lower bound down.
-        let mut doubtful = f64::INFINITY;
-        while let Some(Reverse(candidate)) = self.queue.pop() {
-            let id = candidate.id;
-            let Some(plane) = self.polytope.plane(id).copied() else {
-                continue;
-            };
-            let known = candidate.offset.min(least.reach).min(doubtful);
-            if candidate.offset >= least.reach - goal.tolerance || known >= goal.enough {
-                return Ok((known, least));
-            }
-            let direction = longer(&plane.normal);
-            let (reach, point) = space.scaled_support(&direction);
-            least.see(reach, &direction);
-            if least.reach <= goal.too_little {
-                return Ok((known, least));
-            }
-            let point = shorter(&point);
-            if plane.height(&point) > flat && !self.polytope.has_point(&point) {
-                self.polytope.insert(&point, id, "epsilon", MOST_FACETS)?;
-                self.queue_created(least.reach);
-            } else if candidate.refined {
-                doubtful = doubtful.min(candidate.offset);
-            } else {
-                // Nothing lies beyond: the facet deserves the better plane before it decides.
-                self.polytope.refine(id);
-                let offset = self.polytope.plane(id).map_or(plane.offset, |p| p.offset);
-                self.queue.push(Reverse(Candidate {
-                    offset,
-                    id,
-                    refined: true,
-                }));
-            }
-        }
-        Ok((least.reach.min(doubtful), least))
-    }
-
-    fn queue_created(&mut self, upper: f64) {
-        for &id in self.polytope.created() {
-            if let Some(plane) = self.polytope.plane(id)
-                && plane.offset < upper
-            {
-                self.queue.push(Reverse(Candidate {
-                    offset: plane.offset,
-                    id,
-                    refined: false,
-                }));
-            }
-        }
-    }
-}
-
-/// Coordinates that count.
-pub(crate) fn shorter<const D: usize>(point: &[f64; 6]) -> [f64; D] {
-    std::array::from_fn(|k| point[k])
-}
-
-/// Coordinates filled up with zeros.
-pub(crate) fn longer<const D: usize>(point: &[f64; D]) -> [f64; 6] {
-    std::array::from_fn(|k| if k < D { point[k] } else { 0.0 })
-}
-
-/// A facet that waits, ordered by its offset, then by its place, so that ties never depend on history.
-#[derive(Debug, Clone, Copy)]
-struct Candidate {
-    offset: f64,
-    id: FacetId,
-    refined: bool,
-}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.offset.total_cmp(&other.offset).then(self.id.cmp(&other.id))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
+pub(crate) const MOST_FACETS: usize = 400_000;
 
 #[cfg(test)]
 mod tests {
@@ -378,20 +332,58 @@ mod tests {
         }
     }
 
+    /// ε by the polytope that keeps its whole boundary.
+    fn by_whole(space: &GraspWrenchSpace) -> f64 {
+        let goal = Goal::new(TOLERANCE * space.scaled_size());
+        let mut least = Least::new();
+        if let Some(simplex) = first_simplex(space, &mut least, goal.too_little, goal.tolerance) {
+            Whole::default().run(space, &simplex, &goal, &mut least).unwrap();
+        }
+        if least.reach > FORCE_CLOSURE_TOLERANCE && least.reach.is_finite() {
+            least.reach * space.largest_norm()
+        } else {
+            0.0
+        }
+    }
+
     #[test]
-    fn a_warm_solver_asks_for_no_more_memory() {
+    fn the_whole_boundary_says_the_same() {
         let mut solver = EpsilonSolver::default();
-        let shifts: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
-        let run = |solver: &mut EpsilonSolver| {
-            for &shift in &shifts {
-                solver.epsilon_of(&ball(8, shift), &options()).unwrap();
-            }
+        let mut held = 0;
+        // Contacts on the faces of a cube, at points of a lattice: many wrenches lie in one plane.
+        let mut number = 1_u32;
+        let mut pick = |n: u32| {
+            number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (number >> 16) % n
         };
-        run(&mut solver);
-        let sizes = |s: &EpsilonSolver| (s.growth.polytope.capacities(), s.growth.queue.capacity());
-        let warm = sizes(&solver);
-        run(&mut solver);
-        assert_eq!(sizes(&solver), warm);
+        for n in [4, 5, 6, 7, 9, 12].into_iter().cycle().take(120) {
+            let contacts: Vec<Contact> = (0..n)
+                .map(|i| {
+                    let mut point = Vector3::from_fn(|_, _| f64::from(pick(5)) / 2.0 - 1.0);
+                    let (axis, side) = (pick(3) as usize, if pick(2) == 0 { 1.0 } else { -1.0 });
+                    point[axis] = side;
+                    let mut normal = Vector3::zeros();
+                    normal[axis] = -side;
+                    Contact::new(i, Point3::from(point), normal, 0.5, 0.0).unwrap()
+                })
+                .collect();
+            let space = GraspWrenchSpace::new(&contacts, &options()).unwrap();
+            let exact = solver.epsilon(&space).unwrap();
+            assert!((by_whole(&space) - exact).abs() < 1e-12 * space.largest_norm());
+            held += usize::from(exact > 0.0);
+        }
+        assert!((20..100).contains(&held), "{held}");
+        for n in 4..9 {
+            for shift in 0..6 {
+                for norm in [crate::Norm::L1, crate::Norm::LInf] {
+                    let options = QualityOptions { norm, ..options() };
+                    let n = if norm == crate::Norm::L1 { n } else { n.min(5) };
+                    let space = GraspWrenchSpace::new(&ball(n, 0.1 * f64::from(shift)), &options).unwrap();
+                    let exact = solver.epsilon(&space).unwrap();
+                    assert!((by_whole(&space) - exact).abs() < 1e-12 * space.largest_norm() * n as f64);
+                }
+            }
+        }
     }
 
     #[test]

@@ -47,12 +47,16 @@ mod options;
 mod friction_cone;
 mod wrench_space;
 
+mod edges;
+mod frontier;
 mod hyperplane;
 mod polytope;
 
+mod descent;
 mod start;
 
 mod epsilon;
+mod growth;
 mod min_norm;
 mod volume;
 

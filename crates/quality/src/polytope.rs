@@ -357,20 +357,6 @@ impl<const D: usize> Polytope<D> {
     fn plane_through(&self, corners: &[u16; D]) -> Option<Hyperplane<D>> {
         through_points(&corners.map(|c| self.points[usize::from(c)]), &self.inside)
     }
-
-    /// Whether the memory that is kept from call to call has grown; for tests.
-    #[cfg(test)]
-    pub(crate) fn capacities(&self) -> [usize; 7] {
-        [
-            self.points.capacity(),
-            self.facets.capacity(),
-            self.free.capacity(),
-            self.stamps.capacity(),
-            self.seen.capacity(),
-            self.horizon.capacity(),
-            self.created.capacity(),
-        ]
-    }
 }
 
 /// Where `value` stands in `slots`. It always does: facets that share a ridge share its corners. Without a branch.

@@ -1,6 +1,7 @@
 //! Volume of the wrench space: the one measure that needs the whole hull.
 
-use crate::epsilon::{SEEN_TOLERANCE, TOLERANCE, longer, shorter};
+use crate::epsilon::{SEEN_TOLERANCE, TOLERANCE};
+use crate::growth::{longer, shorter};
 use crate::polytope::Polytope;
 use crate::start::{Least, first_simplex};
 use crate::{GraspWrenchSpace, QualityError};
