@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 /// How a command ended when it did not stop with an error.
@@ -91,6 +92,40 @@ pub fn each_json_line(
     };
     each(json, "line", lines.map(|(i, l)| (json!(i), (i, l))), run, text)
 }
+
+/// [`each_json_line`] with lines answered side by side; answers still come in order.
+pub fn each_json_line_in_parallel(
+    json: bool,
+    path: &Path,
+    run: impl Fn(Value) -> Result<Value> + Sync,
+    text: impl Fn(&Value) -> String,
+) -> Result<Outcome> {
+    let input = prehend::files::read_text(path)?;
+    let lines: Vec<(usize, &str)> = (1..)
+        .zip(input.lines())
+        .filter(|(_, l)| !l.trim().is_empty())
+        .collect();
+    let mut outcome = Outcome::Done;
+    for part in lines.chunks(LINES_AT_ONCE) {
+        let answers: Vec<(Value, Result<Value>)> = part
+            .par_iter()
+            .map(|&(number, line)| {
+                let answer = json_object(line).and_then(&run);
+                (
+                    json!(number),
+                    answer.with_context(|| format!("{}, line {number}", shown(path))),
+                )
+            })
+            .collect();
+        if each(json, "line", answers, |answer| answer, &text)? == Outcome::SomeFailed {
+            outcome = Outcome::SomeFailed;
+        }
+    }
+    Ok(outcome)
+}
+
+/// Lines that are answered before the first of them is printed.
+const LINES_AT_ONCE: usize = 64;
 
 fn json_object(line: &str) -> Result<Value> {
     let value: Value = serde_json::from_str(line).map_err(|e| {

@@ -53,6 +53,47 @@ pub fn close(
     preshape: &JointPositions,
     options: &CloseOptions,
 ) -> Result<Closed, GraspError> {
+    ReadyHand::new(hand)?.close(object, object_from_root, preshape, options)
+}
+
+/// A hand made ready for closing many times, from any number of threads.
+#[derive(Debug, Clone)]
+pub struct ReadyHand<'a>(GraspHand<'a>);
+
+impl<'a> ReadyHand<'a> {
+    /// Makes a hand ready.
+    ///
+    /// # Errors
+    ///
+    /// A hand without description, shape or known materials.
+    pub fn new(hand: &'a Hand) -> Result<Self, GraspError> {
+        GraspHand::new(hand).map(Self)
+    }
+
+    /// [`close()`] with this hand.
+    ///
+    /// # Errors
+    ///
+    /// [`GraspError::NotFinite`] for a pose or a support plane with NaN or infinite numbers.
+    pub fn close(
+        &self,
+        object: &GraspObject,
+        object_from_root: &Isometry3<f64>,
+        preshape: &JointPositions,
+        options: &CloseOptions,
+    ) -> Result<Closed, GraspError> {
+        closed(&self.0, object, object_from_root, preshape, options)
+    }
+}
+
+fn closed(
+    model: &GraspHand<'_>,
+    object: &GraspObject,
+    object_from_root: &Isometry3<f64>,
+    preshape: &JointPositions,
+    options: &CloseOptions,
+) -> Result<Closed, GraspError> {
+    let hand = model.hand;
     let numbers = object_from_root
         .translation
         .vector
@@ -68,12 +109,11 @@ pub fn close(
             value,
         });
     }
-    let model = GraspHand::new(hand)?;
     let mut solver = EpsilonSolver::default();
-    let standing = standing(&model, object_from_root, preshape);
-    if self_collides(&model, preshape) {
+    let standing = standing(model, object_from_root, preshape);
+    if self_collides(model, preshape) {
         return Ok(rejected(
-            &model,
+            model,
             object,
             object_from_root,
             standing,
@@ -88,38 +128,38 @@ pub fn close(
         let farthest = (nalgebra::center(&low, &high) - Point3::from(object_from_palm.translation.vector))
             .norm()
             + (high - low).norm();
-        match arrive(&model, object, preshape, &pose, direction, farthest) {
+        match arrive(model, object, preshape, &pose, direction, farthest) {
             Ok(arrived) if arrived.solid.is_some() => pose = arrived.object_from_root,
             Ok(_) => {
                 return Ok(rejected(
-                    &model,
+                    model,
                     object,
                     object_from_root,
                     standing,
                     Reason::NoContact,
                 ));
             }
-            Err(reason) => return Ok(rejected(&model, object, object_from_root, standing, reason)),
+            Err(reason) => return Ok(rejected(model, object, object_from_root, standing, reason)),
         }
     }
     // A candidate may stand with all of a link inside the object, where no surface is near.
-    let sunk = standing_depth(&model, object, &standing) > 0.0;
+    let sunk = standing_depth(model, object, &standing) > 0.0;
     let Some(posture) = (!sunk)
-        .then(|| close_fingers(&model, object, &pose, preshape).ok())
+        .then(|| close_fingers(model, object, &pose, preshape).ok())
         .flatten()
     else {
         return Ok(rejected(
-            &model,
+            model,
             object,
             object_from_root,
             standing,
             Reason::StartCollision,
         ));
     };
-    let checked = checked_contacts(&model, object, &posture, options.support_plane);
+    let checked = checked_contacts(model, object, &posture, options.support_plane);
     let (contacts, mut reason) = match checked {
         Ok(contacts) => (contacts, None),
-        Err(reason) => (contacts_of(&model, object, &posture.solid_poses), Some(reason)),
+        Err(reason) => (contacts_of(model, object, &posture.solid_poses), Some(reason)),
     };
     let epsilon = epsilon_of(object, &contacts, &mut solver);
     if reason.is_none() && epsilon <= 0.0 {
@@ -129,7 +169,7 @@ pub fn close(
     let points: Vec<_> = contacts.iter().map(|c| c.at.point).collect();
     Ok(Closed {
         object_from_root: pose,
-        penetration: standing_depth(&model, object, &posture),
+        penetration: standing_depth(model, object, &posture),
         joints: posture.joints,
         free_volume: free_volume(&palm, &points, object.leaves()),
         contacts,

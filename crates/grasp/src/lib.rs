@@ -48,6 +48,7 @@ mod closing;
 mod contacts;
 mod features;
 mod free_surface;
+mod refine;
 
 mod close;
 mod synthesize;
@@ -55,7 +56,7 @@ mod synthesize;
 #[cfg(test)]
 mod testing;
 
-pub use close::{CloseOptions, Closed, close};
+pub use close::{CloseOptions, Closed, ReadyHand, close};
 pub use contacts::{CONTACT_TOLERANCE, MERGE_DISTANCE};
 pub use error::GraspError;
 pub use features::{
@@ -67,5 +68,7 @@ pub use grasp::{Features, Grasp, LinkContact};
 pub use hypothesis::{Face, Hypothesis, OPENING_MARGIN, PALM_CLEARANCE, hypotheses};
 pub use object::{GraspObject, Region};
 pub use reason::Reason;
-pub use synthesize::{ROUND, Synthesis, SynthesisOptions, retry, synthesize};
-pub use tries::{MOST_PRESHAPES, OFFSET_SHARE, PRESHAPES, Tries, Try};
+pub use synthesize::{
+    HypothesisBoxes, Proposal, ROUND, Synthesis, SynthesisOptions, Tally, retry, synthesize, synthesize_each,
+};
+pub use tries::{MOST_PRESHAPES, OFFSET_SHARE, PRESHAPES, Preshapes, Tries, Try};

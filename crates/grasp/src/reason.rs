@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Reason {
+    /// It was not closed: whoever asked does not want grasps from there.
+    PassedOver,
     /// The pre-shape's links collide with each other.
     SelfCollision,
     /// The hand collides with the object where its approach starts.
@@ -27,7 +29,8 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, in the order in which a try is checked.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
+        Self::PassedOver,
         Self::SelfCollision,
         Self::StartCollision,
         Self::ForbiddenLink,
@@ -41,6 +44,7 @@ impl Reason {
     /// Its name in files and messages, for example `start-collision`.
     pub fn name(self) -> &'static str {
         match self {
+            Self::PassedOver => "passed-over",
             Self::SelfCollision => "self-collision",
             Self::StartCollision => "start-collision",
             Self::ForbiddenLink => "forbidden-link",
@@ -55,6 +59,9 @@ impl Reason {
     /// What to look at where many tries end like this.
     pub fn hint(self) -> &'static str {
         match self {
+            Self::PassedOver => {
+                "proposals leave out what hardly serves the task: plan without them to see all grasps"
+            }
             Self::SelfCollision => {
                 "pre-shapes drive links of the hand through each other: narrow the eigengrasps' `limits` in hand.toml, or list \
                  links that always overlap under `self_collision_exempt`"

@@ -13,13 +13,16 @@ use crate::closing::{Posture, close_fingers, self_collides};
 use crate::contacts::{CONTACT_TOLERANCE, contacts_of};
 use crate::features::free_volume_with;
 use crate::grasp_hand::GraspHand;
+use crate::refine::refined;
 use crate::{
-    Face, Features, Grasp, GraspError, GraspObject, LinkContact, Reason, Tries, Try, hypotheses,
+    Face, Features, Grasp, GraspError, GraspObject, LinkContact, Preshapes, Reason, Tries, Try, hypotheses,
     palm_orientation, unified_position,
 };
 
 /// Tries between two looks at whether there are enough grasps.
 pub const ROUND: usize = 200;
+/// Tries whose grasps are held at once where nobody asks.
+const LONG_ROUND: usize = 4096;
 
 /// How many grasps to look for, and where.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +38,22 @@ pub struct SynthesisOptions {
     pub stream: String,
     /// No part of the hand may lie below this height (m) in the object's frame.
     pub support_plane: Option<f64>,
+    /// Which boxes hypotheses come from.
+    pub boxes: HypothesisBoxes,
+    /// How hypotheses get their pre-shapes.
+    pub preshapes: Preshapes,
+    /// Steps of local search for a larger ε, for each grasp that holds; each costs about a try. None in the paper.
+    pub refinement: usize,
+}
+
+/// Which boxes hypotheses come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HypothesisBoxes {
+    /// The leaves of the decomposition only.
+    Leaves,
+    /// The inner nodes of its tree, too: the object as a whole, and parts that a hand takes together.
+    #[default]
+    Tree,
 }
 
 impl Default for SynthesisOptions {
@@ -45,8 +64,35 @@ impl Default for SynthesisOptions {
             seed: 0,
             stream: String::new(),
             support_plane: None,
+            boxes: HypothesisBoxes::default(),
+            preshapes: Preshapes::default(),
+            refinement: 0,
         }
     }
+}
+
+/// What a try is going to be, before anything is closed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Proposal {
+    /// Eigengrasp amplitudes.
+    pub egpc: [f64; 2],
+    /// Where the hand comes from: `upos` of the palm on its approach line.
+    pub upos: [f64; 3],
+    /// Orientation of the palm frame: w, x, y, z.
+    pub dir: [f64; 4],
+}
+
+/// How the tries went, without the grasps.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tally {
+    /// How many grasps hold.
+    pub kept: usize,
+    /// How many tries failed, and why.
+    pub rejected: BTreeMap<Reason, usize>,
+    /// How many tries were looked at; those passed over among them.
+    pub tried: usize,
+    /// How many hypotheses there are.
+    pub n_hypotheses: usize,
 }
 
 /// What became of the tries.
@@ -77,19 +123,67 @@ pub fn synthesize(
     options: &SynthesisOptions,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<Synthesis, GraspError> {
+    let mut grasps = Vec::new();
+    let tally = synthesize_each(hand, object, options, None, progress, &mut |grasp| {
+        grasps.push(grasp);
+        true
+    })?;
+    Ok(Synthesis {
+        grasps,
+        rejected: tally.rejected,
+        tried: tally.tried,
+        n_hypotheses: tally.n_hypotheses,
+    })
+}
+
+/// Tries that may be passed over for each one that is closed, at most.
+const MOST_PASSED_OVER: usize = 100;
+
+/// [`synthesize`] that hands grasps over as they are found, in order of their tries, and keeps none: any number of tries
+/// needs the memory of one round.
+///
+/// Where `wanted` is given, it is asked before a try is closed; those that it does not want are counted as
+/// [`Reason::PassedOver`] and others are made in their place, up to a hundred for each. `each` may return false to end
+/// the search.
+///
+/// # Errors
+///
+/// As [`synthesize`].
+pub fn synthesize_each(
+    hand: &Hand,
+    object: &GraspObject,
+    options: &SynthesisOptions,
+    wanted: Option<&(dyn Fn(&Proposal) -> bool + Sync)>,
+    progress: &(dyn Fn(usize) -> bool + Sync),
+    each: &mut dyn FnMut(Grasp) -> bool,
+) -> Result<Tally, GraspError> {
     let (model, tries) = prepared(hand, object, options)?;
+    let mut tally = Tally {
+        n_hypotheses: tries.n_hypotheses(),
+        ..Tally::default()
+    };
     let n_tries = if tries.n_hypotheses() == 0 {
         0
     } else {
         options.tries
     };
+    let most_looked_at = wanted.map_or(n_tries, |_| n_tries.saturating_mul(MOST_PASSED_OVER));
+    let round_length = if options.enough.is_some() || wanted.is_some() {
+        ROUND
+    } else {
+        LONG_ROUND
+    };
     let (stop, finished) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let mut grasps = Vec::new();
-    let mut rejected = BTreeMap::new();
-    let mut tried = 0;
-    while tried < n_tries && options.enough.is_none_or(|enough| grasps.len() < enough) {
-        let round = tried..n_tries.min(tried + options.enough.map_or(n_tries, |_| ROUND));
-        tried = round.end;
+    let mut n_closed = 0;
+    while n_closed < n_tries
+        && tally.tried < most_looked_at
+        && options.enough.is_none_or(|enough| tally.kept < enough)
+    {
+        let length = round_length
+            .min(n_tries - n_closed)
+            .min(most_looked_at - tally.tried);
+        let round = tally.tried..tally.tried + length;
+        tally.tried = round.end;
         let outcomes: Vec<Option<Result<Grasp, Reason>>> = round
             .into_par_iter()
             .map_init(EpsilonSolver::default, |solver, try_idx| {
@@ -97,7 +191,12 @@ pub fn synthesize(
                     return None;
                 }
                 let attempt = tries.get(try_idx, object)?;
-                let outcome = run_try(&model, object, &attempt, options.support_plane, solver);
+                let is_wanted =
+                    wanted.is_none_or(|wanted| proposal(&attempt, object).is_some_and(|p| wanted(&p)));
+                if !is_wanted {
+                    return Some(Err(Reason::PassedOver));
+                }
+                let outcome = run_and_refine(&model, object, &tries, &attempt, options, solver);
                 let n_finished = finished.fetch_add(1, Ordering::Relaxed) + 1;
                 if !progress(n_finished) {
                     stop.store(true, Ordering::Relaxed);
@@ -105,24 +204,59 @@ pub fn synthesize(
                 Some(outcome)
             })
             .collect();
+        for outcome in outcomes.into_iter().flatten() {
+            n_closed += usize::from(outcome != Err(Reason::PassedOver));
+            match outcome {
+                Ok(grasp) => {
+                    tally.kept += 1;
+                    if !each(grasp) {
+                        stop.store(true, Ordering::Relaxed);
+                    }
+                }
+                Err(reason) => *tally.rejected.entry(reason).or_insert(0) += 1,
+            }
+        }
         if stop.load(Ordering::Relaxed) {
             return Err(GraspError::Stopped {
                 tried: finished.into_inner(),
             });
         }
-        for outcome in outcomes.into_iter().flatten() {
-            match outcome {
-                Ok(grasp) => grasps.push(grasp),
-                Err(reason) => *rejected.entry(reason).or_insert(0) += 1,
-            }
-        }
     }
-    Ok(Synthesis {
-        grasps,
-        rejected,
-        tried,
-        n_hypotheses: tries.n_hypotheses(),
+    Ok(tally)
+}
+
+/// What a try is going to be; `None` where the palm starts outside the sphere on which positions are measured.
+fn proposal(attempt: &Try, object: &GraspObject) -> Option<Proposal> {
+    let object_from_palm = attempt.hypothesis.object_from_palm(object);
+    Some(Proposal {
+        egpc: attempt.egpc,
+        upos: unified_position(&object_from_palm, &object.root().center())?,
+        dir: palm_orientation(&object_from_palm.rotation),
     })
+}
+
+/// Makes one try, and where it holds looks nearby for a better one.
+fn run_and_refine(
+    hand: &GraspHand<'_>,
+    object: &GraspObject,
+    tries: &Tries,
+    attempt: &Try,
+    options: &SynthesisOptions,
+    solver: &mut EpsilonSolver,
+) -> Result<Grasp, Reason> {
+    let grasp = run_try(hand, object, attempt, options.support_plane, solver)?;
+    if options.refinement == 0 {
+        return Ok(grasp);
+    }
+    let seed = tries.seed_of(attempt.try_idx);
+    Ok(refined(
+        grasp,
+        attempt,
+        object,
+        options.refinement,
+        seed,
+        |nearby| run_try(hand, object, nearby, options.support_plane, solver).ok(),
+    ))
 }
 
 /// Makes one try again: the grasp of a row, from its try's number and the options that the table was made with.
@@ -140,11 +274,12 @@ pub fn retry(
     let attempt = tries
         .get(try_idx, object)
         .ok_or(GraspError::NoSuchTry { try_idx })?;
-    Ok(run_try(
+    Ok(run_and_refine(
         &model,
         object,
+        &tries,
         &attempt,
-        options.support_plane,
+        options,
         &mut EpsilonSolver::default(),
     ))
 }
@@ -161,8 +296,11 @@ fn prepared<'a>(
         });
     }
     let model = GraspHand::new(hand)?;
-    let found = hypotheses(object, model.description().opening_width, model.palm_width);
-    let tries = Tries::new(found, options.seed, &options.stream);
+    let mut found = hypotheses(object, model.description().opening_width, model.palm_width);
+    if options.boxes == HypothesisBoxes::Leaves {
+        found.retain(|hypothesis| hypothesis.box_idx < object.leaves().len());
+    }
+    let tries = Tries::new(found, options.seed, &options.stream).with_preshapes(options.preshapes);
     Ok((model, tries))
 }
 

@@ -13,6 +13,9 @@ pub const MOST_PRESHAPES: usize = 20;
 /// How far from a hypothesis such a try may lie, as a share of the face's edges (either way).
 pub const OFFSET_SHARE: f64 = 0.25;
 
+/// 1/φ and 1/φ² with φ³ = φ + 1.
+const EVEN_STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
+
 /// One try: a hypothesis and a pre-shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Try {
@@ -37,6 +40,18 @@ pub struct Tries {
     hypotheses: Vec<Hypothesis>,
     order: Vec<usize>,
     seed: u64,
+    preshapes: Preshapes,
+}
+
+/// How a hypothesis gets its pre-shapes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preshapes {
+    /// Drawn independently, as in the paper.
+    #[default]
+    Random,
+    /// A sequence that fills the square evenly, shifted at random for each hypothesis: multiples of 1/φ and 1/φ², φ the
+    /// root of φ³ = φ + 1.
+    LowDiscrepancy,
 }
 
 impl Tries {
@@ -49,7 +64,19 @@ impl Tries {
             hypotheses,
             order,
             seed,
+            preshapes: Preshapes::default(),
         }
+    }
+
+    /// The same tries with pre-shapes of this kind.
+    #[must_use]
+    pub fn with_preshapes(self, preshapes: Preshapes) -> Self {
+        Self { preshapes, ..self }
+    }
+
+    /// A seed of its own for whatever a try draws later.
+    pub(crate) fn seed_of(&self, try_idx: usize) -> u64 {
+        mixed(mixed(!self.seed) ^ try_idx as u64)
     }
 
     /// How many hypotheses there are.
@@ -67,7 +94,14 @@ impl Tries {
         let mut hypothesis = self.hypotheses[hypothesis_idx];
         let item = mixed(mixed(self.seed ^ hypothesis_idx as u64) ^ round as u64);
         let mut rng = ChaCha8Rng::seed_from_u64(item);
-        let egpc = [rng.random_range(-1.0..=1.0), rng.random_range(-1.0..=1.0)];
+        let mut egpc = [rng.random_range(-1.0..=1.0), rng.random_range(-1.0..=1.0)];
+        if self.preshapes == Preshapes::LowDiscrepancy {
+            let mut of_hypothesis = ChaCha8Rng::seed_from_u64(mixed(self.seed ^ hypothesis_idx as u64));
+            for (amplitude, step) in egpc.iter_mut().zip(EVEN_STEPS) {
+                let shift: f64 = of_hypothesis.random_range(0.0..1.0);
+                *amplitude = 2.0 * (shift + round as f64 * step).fract() - 1.0;
+            }
+        }
         if round >= MOST_PRESHAPES {
             let face = Face::of(
                 &object.regions()[hypothesis.box_idx].oriented_box,
@@ -132,6 +166,29 @@ mod tests {
         for other in [tries(&cube, 2, "cube"), tries(&cube, 1, "cabe")] {
             assert!(first.iter().zip(&other).all(|(a, b)| a.egpc != b.egpc));
         }
+    }
+
+    #[test]
+    fn even_pre_shapes_fill_the_square_more_evenly_than_random_ones() {
+        let cube = boxes_object(&[([0.0; 3], [0.04; 3])]);
+        let empty_cells = |preshapes| {
+            let tries = Tries::new(hypotheses(&cube, 0.1, 0.08), 1, "cube").with_preshapes(preshapes);
+            let mut of_hypothesis = std::collections::BTreeMap::new();
+            for t in (0..24 * 16).map(|i| tries.get(i, &cube).unwrap()) {
+                let cell = t.egpc.map(|a| ((a + 1.0) * 2.0).min(3.0) as usize);
+                let seen = of_hypothesis.entry((t.hypothesis.face, t.hypothesis.roll));
+                seen.or_insert_with(std::collections::BTreeSet::new).insert(cell);
+            }
+            of_hypothesis
+                .values()
+                .map(|cells| 16 - cells.len())
+                .sum::<usize>()
+        };
+        let (even, random) = (
+            empty_cells(Preshapes::LowDiscrepancy),
+            empty_cells(Preshapes::Random),
+        );
+        assert!(2 * even < random, "{even} {random}");
     }
 
     #[test]

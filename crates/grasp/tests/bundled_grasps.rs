@@ -7,8 +7,8 @@ use parry3d_f64::math::{Pose, Rotation, Vector};
 use parry3d_f64::{query, shape};
 use prehend_geometry::{DecomposeOptions, MeshFormat, Solid, decompose, read_mesh};
 use prehend_grasp::{
-    CONTACT_TOLERANCE, CloseOptions, Grasp, GraspError, GraspObject, Reason, SynthesisOptions, close, retry,
-    synthesize,
+    CONTACT_TOLERANCE, CloseOptions, Grasp, GraspError, GraspObject, Proposal, Reason, SynthesisOptions,
+    close, retry, synthesize, synthesize_each,
 };
 use prehend_hand::Hand;
 use prehend_quality::Material;
@@ -271,4 +271,71 @@ fn a_plane_keeps_every_link_above_it_and_a_callback_can_stop_the_search() {
     }
     let stopped = synthesize(&hand, &object, &options(60), &|n| n < 5);
     assert!(matches!(stopped, Err(GraspError::Stopped { tried }) if tried >= 5));
+}
+
+#[test]
+fn refined_grasps_hold_at_least_as_well_and_stay_with_their_tries() {
+    let (hand, object) = (hand("schunk_sdh"), object("mug/coffee_mug.ply"));
+    let plain = synthesize(&hand, &object, &options(30), &|_| true).unwrap();
+    let refining = SynthesisOptions {
+        refinement: 4,
+        ..options(30)
+    };
+    let refined = synthesize(&hand, &object, &refining, &|_| true).unwrap();
+    assert_eq!(refined.rejected, plain.rejected);
+    let better = |(before, after): (&Grasp, &Grasp)| {
+        assert_eq!(before.try_idx, after.try_idx);
+        assert!(after.features.qeps >= before.features.qeps);
+        after.features.qeps > before.features.qeps
+    };
+    let n_better = plain
+        .grasps
+        .iter()
+        .zip(&refined.grasps)
+        .map(better)
+        .filter(|b| *b)
+        .count();
+    assert!(
+        n_better > plain.grasps.len() / 2,
+        "{n_better} of {}",
+        plain.grasps.len()
+    );
+    let last = refined.grasps.last().unwrap();
+    assert_eq!(
+        retry(&hand, &object, &refining, last.try_idx).unwrap().as_ref(),
+        Ok(last)
+    );
+}
+
+#[test]
+fn tries_that_nobody_wants_are_passed_over_and_others_made_in_their_place() {
+    let (hand, object) = (hand("schunk_sdh"), object("mug/coffee_mug.ply"));
+    let open = |proposal: &Proposal| proposal.egpc[1] > 0.5;
+    let mut grasps = Vec::new();
+    let tally = synthesize_each(
+        &hand,
+        &object,
+        &options(40),
+        Some(&open),
+        &|_| true,
+        &mut |grasp| {
+            grasps.push(grasp);
+            true
+        },
+    );
+    let tally = tally.unwrap();
+    assert!(!grasps.is_empty() && grasps.iter().all(|g| g.features.egpc[1] > 0.5));
+    let passed_over = tally.rejected[&Reason::PassedOver];
+    assert_eq!(tally.tried - passed_over, 40);
+    assert_eq!(tally.kept + tally.rejected.values().sum::<usize>(), tally.tried);
+    let none = synthesize_each(
+        &hand,
+        &object,
+        &options(5),
+        Some(&|_| false),
+        &|_| true,
+        &mut |_| true,
+    )
+    .unwrap();
+    assert_eq!((none.kept, none.rejected[&Reason::PassedOver]), (0, 500));
 }

@@ -1,7 +1,7 @@
 //! Reading and writing whole files. A file under its final name is always complete.
 
 use std::fs::{self, File};
-use std::io::{Read, Write};
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -57,26 +57,65 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
 ///
 /// [`Error::File`]; the old file, if any, is then untouched.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
-    let name = path
-        .file_name()
-        .ok_or_else(|| Error::file(path, "is no file name; give a file to write"))?;
-    let beside = folder.join(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
-    let result = (|| {
-        let mut file = File::create(&beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&beside, path)?;
-        File::open(folder)?.sync_all()
-    })();
-    result.map_err(|e| {
-        let _ = fs::remove_file(&beside);
-        Error::file(path, e)
-    })
+    let unfinished = Unfinished::create(path)?;
+    let mut file = &unfinished.file;
+    file.write_all(bytes).map_err(|e| Error::file(path, e))?;
+    unfinished.finish()
+}
+
+/// A file that is being written beside its final name; gone where it is dropped before [`Unfinished::finish`].
+pub(crate) struct Unfinished {
+    path: PathBuf,
+    folder: PathBuf,
+    beside: PathBuf,
+    file: File,
+}
+
+impl Unfinished {
+    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
+        let folder = path
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
+        fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
+        let name = path
+            .file_name()
+            .ok_or_else(|| Error::file(path, "is no file name; give a file to write"))?;
+        let beside = folder.join(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
+        Ok(Self {
+            file: File::create(&beside).map_err(|e| Error::file(path, e))?,
+            path: path.to_owned(),
+            folder: folder.to_owned(),
+            beside,
+        })
+    }
+
+    /// The final name.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn writer(&self) -> Result<BufWriter<File>, Error> {
+        let file = self.file.try_clone().map_err(|e| Error::file(&self.path, e))?;
+        Ok(BufWriter::new(file))
+    }
+
+    /// Gives the file its name, once it is safely on the disk.
+    pub(crate) fn finish(self) -> Result<(), Error> {
+        let result = (|| {
+            self.file.sync_all()?;
+            fs::rename(&self.beside, &self.path)?;
+            File::open(&self.folder)?.sync_all()
+        })();
+        result.map_err(|e| Error::file(&self.path, e))
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        // After a rename nothing is there any more.
+        let _ = fs::remove_file(&self.beside);
+    }
 }
 
 /// Every file below `folder` with one of the extensions (lower case), sorted by path; a file is its own answer, and so

@@ -8,6 +8,9 @@ use crate::{Error, files};
 mod csv_table;
 mod json_lines;
 mod parquet_table;
+mod table_writer;
+
+pub use table_writer::TableWriter;
 
 /// One column; every column of a frame has as many entries as the frame has rows.
 #[derive(Debug, Clone, PartialEq)]

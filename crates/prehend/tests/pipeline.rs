@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use prehend::frame::Frame;
 use prehend::grasp_table::records;
 use prehend::hand_folder::read_described_hand;
-use prehend::plan::plan;
+use prehend::plan::{Request, plan};
 use prehend::progress::unwatched;
 use prehend::stages::decompose::shape_of;
 use prehend::{Error, ObjectOptions, files};
@@ -145,7 +145,13 @@ fn a_plan_ranks_grasps_by_the_probability_of_the_task() {
         seed: 3,
         ..SynthesisOptions::default()
     };
-    let answer = plan(&hand, &glass, "pouring", &model, 5, &options, unwatched()).unwrap();
+    let request = |task| Request {
+        task,
+        model: &model,
+        top: 5,
+        proposals: false,
+    };
+    let answer = plan(&hand, &glass, &request("pouring"), &options, unwatched()).unwrap();
     assert!(answer.kept >= answer.grasps.len() && answer.tried == 60);
     assert!(!answer.grasps.is_empty() && answer.grasps.len() <= 5);
     assert!(answer.reason.is_none());
@@ -155,7 +161,16 @@ fn a_plan_ranks_grasps_by_the_probability_of_the_task() {
         "{p:?}"
     );
 
-    let unknown = plan(&hand, &glass, "juggling", &model, 5, &options, unwatched()).unwrap_err();
+    let proposed = Request {
+        proposals: true,
+        ..request("pouring")
+    };
+    let drawn = plan(&hand, &glass, &proposed, &options, unwatched()).unwrap();
+    assert!(drawn.closed <= 60 && drawn.tried >= drawn.closed && drawn.kept > 0);
+    let share = |suitable: usize, kept: usize| suitable as f64 / kept as f64;
+    assert!(share(drawn.suitable, drawn.kept) >= share(answer.suitable, answer.kept));
+
+    let unknown = plan(&hand, &glass, &request("juggling"), &options, unwatched()).unwrap_err();
     assert_eq!(
         unknown.to_string(),
         "the model knows no task `juggling`; it knows hand-over, pouring, tool-use"
@@ -164,6 +179,6 @@ fn a_plan_ranks_grasps_by_the_probability_of_the_task() {
         support_plane: Some(1.0),
         ..options
     };
-    let none = plan(&hand, &glass, "pouring", &model, 5, &nowhere, unwatched()).unwrap();
+    let none = plan(&hand, &glass, &request("pouring"), &nowhere, unwatched()).unwrap();
     assert!(none.grasps.is_empty() && none.reason.is_some());
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use prehend::grasp::{CloseOptions, GraspObject, close};
+use prehend::grasp::{CloseOptions, GraspObject, ReadyHand};
 use prehend::grasp_table::ContactRecord;
 use prehend::hand::Hand;
 use prehend::stages::decompose::shape_of;
@@ -65,12 +65,19 @@ impl Arguments {
         let hand = HandData::read(&self.hand)?.hand;
         let shape = shape_of(&self.object, self.placement.object_options())?;
         let object = shape.grasp_object()?;
-        let run = |line: Value| closed(&hand, &object, line, self.support_plane);
-        output::each_json_line(json, &self.file, run, output::plain)
+        let ready = ReadyHand::new(&hand).map_err(|e| prehend::Error::file(&self.hand, e))?;
+        let run = |line: Value| closed(&hand, &ready, &object, line, self.support_plane);
+        output::each_json_line_in_parallel(json, &self.file, run, output::plain)
     }
 }
 
-fn closed(hand: &Hand, object: &GraspObject, line: Value, support_plane: Option<f64>) -> Result<Value> {
+fn closed(
+    hand: &Hand,
+    ready: &ReadyHand<'_>,
+    object: &GraspObject,
+    line: Value,
+    support_plane: Option<f64>,
+) -> Result<Value> {
     let candidate: Candidate = serde_json::from_value(line).context("expected pose, joints and approach")?;
     let [w, x, y, z] = candidate.pose.quaternion_wxyz;
     let quaternion = Quaternion::new(w, x, y, z);
@@ -91,7 +98,7 @@ fn closed(hand: &Hand, object: &GraspObject, line: Value, support_plane: Option<
         approach: candidate.approach,
         support_plane,
     };
-    let closed = close(hand, object, &pose, &preshape, &options)?;
+    let closed = ready.close(object, &pose, &preshape, &options)?;
     Ok(json!({
         "pose": pose_json(&closed.object_from_root),
         "joints": hand.positions_by_name(&closed.joints),
@@ -101,5 +108,6 @@ fn closed(hand: &Hand, object: &GraspObject, line: Value, support_plane: Option<
         "fvol_union": closed.free_volume.fvol_union,
         "penetration": closed.penetration,
         "reason": closed.reason.map(|r| r.to_string()),
+        "hint": closed.reason.map(|r| r.hint()),
     }))
 }

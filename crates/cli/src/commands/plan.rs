@@ -6,7 +6,8 @@ use anyhow::Result;
 use prehend::grasp::SynthesisOptions;
 use prehend::grasp_table::ContactRecord;
 use prehend::hand::Hand;
-use prehend::plan::{Planned, plan};
+use prehend::plan::{Planned, Request, plan};
+use prehend::run_record::timed;
 use prehend::stages::decompose::shape_of;
 use prehend::stages::synthesize::HandData;
 use serde_json::{Value, json};
@@ -47,6 +48,10 @@ pub struct Arguments {
     #[arg(long, default_value_t = 500)]
     tries: usize,
 
+    /// Close only tries drawn from what the model knows of P(action | task, object)
+    #[arg(long)]
+    proposals: bool,
+
     /// Seed of pre-shapes and offsets
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -73,13 +78,22 @@ impl Arguments {
         let bars = Bars::default();
         let watch = bars.watch();
         watch.progress.begin("plan", self.tries as u64);
-        let result = plan(&hand.hand, &shape, &self.task, &model, self.top, &options, watch);
+        let request = Request {
+            task: &self.task,
+            model: &model,
+            top: self.top,
+            proposals: self.proposals,
+        };
+        let (result, seconds) = timed(|| plan(&hand.hand, &shape, &request, &options, watch));
         watch.progress.end();
         let result = result?;
         let mut answer = json!({
             "grasps": result.grasps.iter().map(|g| planned_json(&hand.hand, g)).collect::<Vec<_>>(),
             "tried": result.tried,
+            "closed": result.closed,
             "kept": result.kept,
+            "suitable": result.suitable,
+            "seconds": seconds,
             "scale": shape.object.placement.scale,
             "up": shape.object.placement.up,
             "front": shape.object.placement.front,

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use prehend::frame::Frame;
-use prehend::grasp::SynthesisOptions;
+use prehend::frame::TableWriter;
+use prehend::grasp::{HypothesisBoxes, Preshapes, SynthesisOptions};
 use prehend::run_record::timed;
 use prehend::stages::decompose::shape_of;
-use prehend::stages::synthesize::{HandData, grasp};
+use prehend::stages::synthesize::{HandData, grasp_to};
 use serde_json::{Value, json};
 
 use super::shape_input::PlacementOptions;
@@ -44,38 +44,71 @@ pub struct Arguments {
     #[arg(long, allow_negative_numbers = true)]
     support_plane: Option<f64>,
 
+    /// Which boxes hypotheses come from: the leaves of the decomposition only, or the inner nodes of its tree, too
+    #[arg(long, value_enum, default_value = "tree")]
+    boxes: Boxes,
+
+    /// How pre-shapes are spread: drawn at random, or by a sequence that fills their square evenly
+    #[arg(long, value_enum, default_value = "random")]
+    preshapes: Spread,
+
+    /// Steps of local search for a larger epsilon, for each grasp that holds
+    #[arg(long, default_value_t = 0)]
+    refine: usize,
+
     #[command(flatten)]
     placement: PlacementOptions,
 }
 
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Boxes {
+    Leaves,
+    Tree,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Spread {
+    Random,
+    LowDiscrepancy,
+}
+
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        if let Some(out) = &self.out {
-            Frame::check_name(out)?;
-        }
+        let table = self.out.as_deref().map(TableWriter::create).transpose()?;
         let hand = HandData::read(&self.hand)?;
         let shape = shape_of(&self.object, self.placement.object_options())?;
         let options = SynthesisOptions {
             tries: self.tries,
             seed: self.seed,
             support_plane: self.support_plane,
+            boxes: match self.boxes {
+                Boxes::Leaves => HypothesisBoxes::Leaves,
+                Boxes::Tree => HypothesisBoxes::Tree,
+            },
+            preshapes: match self.preshapes {
+                Spread::Random => Preshapes::Random,
+                Spread::LowDiscrepancy => Preshapes::LowDiscrepancy,
+            },
+            refinement: self.refine,
             ..SynthesisOptions::default()
         };
         let bars = Bars::default();
         let watch = bars.watch();
         watch.progress.begin("synthesize", self.tries as u64);
-        let (result, seconds) = timed(|| grasp(&hand, &shape, &options, watch));
+        let (result, seconds) = timed(|| grasp_to(&hand, &shape, &options, table, watch));
         watch.progress.end();
-        let (frame, tries) = result?;
-        if let Some(out) = &self.out {
-            frame.write(out)?;
-        }
+        let harvest = result?;
+        let tries = &harvest.tries;
         let answer = json!({
             "tried": tries.tried,
             "kept": tries.kept,
             "rejected": tries.rejected,
+            "hints": harvest.hints,
+            "mean_epsilon": harvest.mean_epsilon,
+            "directions": harvest.directions,
             "seconds": seconds,
             "tries_per_second": tries.tried as f64 / seconds,
+            "kept_per_second": tries.kept as f64 / seconds,
             "scale": shape.object.placement.scale,
             "up": shape.object.placement.up,
             "front": shape.object.placement.front,
@@ -90,14 +123,20 @@ impl Arguments {
 }
 
 fn text(answer: &Value) -> String {
+    let number = |key: &str| answer[key].as_f64().unwrap_or(0.0);
     let mut out = format!(
-        "{} of {} tries hold in force closure ({:.0} tries a second)\n",
+        "{} of {} tries hold in force closure ({:.0} tries a second, {:.0} kept)\n\
+         mean epsilon {:.3}, from {:.0} % of all directions\n",
         answer["kept"],
         answer["tried"],
-        answer["tries_per_second"].as_f64().unwrap_or(0.0)
+        number("tries_per_second"),
+        number("kept_per_second"),
+        number("mean_epsilon"),
+        100.0 * number("directions"),
     );
     for (reason, n) in answer["rejected"].as_object().into_iter().flatten() {
-        out += &format!("  {n:>6}  {reason}\n");
+        let hint = answer["hints"][reason].as_str().unwrap_or("");
+        out += &format!("  {n:>6}  {reason}: {hint}\n");
     }
     for note in answer["notes"].as_array().into_iter().flatten() {
         out += &format!("  note: {}\n", note.as_str().unwrap_or(""));

@@ -40,6 +40,11 @@ fn typed(cells: Vec<Option<String>>) -> Column {
     }
 }
 
+/// How many bytes of [`write`] are the header row.
+pub(super) fn header_length(frame: &Frame) -> Result<usize, Error> {
+    Ok(write(&frame.select(&[]))?.len())
+}
+
 pub(super) fn write(frame: &Frame) -> Result<Vec<u8>, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer

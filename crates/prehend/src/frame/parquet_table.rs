@@ -1,6 +1,7 @@
 //! Flat Parquet tables, as pandas, polars and DuckDB write them with their defaults.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::sync::Arc;
 
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical, ZstdLevel};
@@ -15,75 +16,98 @@ use parquet::schema::types::{ColumnDescriptor, Type};
 use super::{Column, Frame};
 use crate::Error;
 
-/// Rows in one row group: small enough that a reader needs little memory.
-const ROWS_PER_GROUP: usize = 50_000;
+/// Rows in one row group: small enough that neither reader nor writer needs much memory.
+pub(super) const ROWS_PER_GROUP: usize = 10_000;
 
 pub(super) fn write(frame: &Frame) -> Result<Vec<u8>, Error> {
-    write_table(frame).map_err(|e| Error::input(format!("the table could not be written: {e}")))
+    let written = ParquetParts::new(Vec::new(), frame).and_then(|mut parts| {
+        parts.append(frame)?;
+        parts.into_inner()
+    });
+    written.map_err(|e| Error::input(format!("the table could not be written: {e}")))
 }
 
-fn write_table(frame: &Frame) -> parquet::errors::Result<Vec<u8>> {
-    let fields = frame.columns().iter().map(|(name, column)| {
-        let (physical, logical, repetition) = match column {
-            Column::Number(_) => (Physical::DOUBLE, None, Repetition::REQUIRED),
-            Column::Integer(_) => (Physical::INT64, None, Repetition::REQUIRED),
-            Column::Text(_) => (
-                Physical::BYTE_ARRAY,
-                Some(LogicalType::String),
-                Repetition::OPTIONAL,
-            ),
-        };
-        Type::primitive_type_builder(name, physical)
-            .with_repetition(repetition)
-            .with_logical_type(logical)
-            .build()
-            .map(Arc::new)
-    });
-    let schema = Type::group_type_builder("schema")
-        .with_fields(fields.collect::<Result<_, _>>()?)
-        .build()?;
-    let pairs = frame
-        .metadata
-        .iter()
-        .map(|(k, v)| KeyValue::new(k.clone(), v.clone()))
-        .collect();
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
-        .set_key_value_metadata(Some(pairs))
-        .build();
-    let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties))?;
-    let mut start = 0;
-    while start < frame.n_rows() {
-        let rows = start..(start + ROWS_PER_GROUP).min(frame.n_rows());
-        let mut group = writer.next_row_group()?;
-        for (_, column) in frame.columns() {
-            let Some(mut out) = group.next_column()? else {
-                break;
+/// A table that is written part by part; all parts have the columns of the first.
+pub(super) struct ParquetParts<W: Write + Send> {
+    writer: SerializedFileWriter<W>,
+}
+
+impl<W: Write + Send> ParquetParts<W> {
+    /// Begins a table with the columns and metadata of `first`; its rows are yet to be appended.
+    pub(super) fn new(out: W, first: &Frame) -> parquet::errors::Result<Self> {
+        let fields = first.columns().iter().map(|(name, column)| {
+            let (physical, logical, repetition) = match column {
+                Column::Number(_) => (Physical::DOUBLE, None, Repetition::REQUIRED),
+                Column::Integer(_) => (Physical::INT64, None, Repetition::REQUIRED),
+                Column::Text(_) => (
+                    Physical::BYTE_ARRAY,
+                    Some(LogicalType::String),
+                    Repetition::OPTIONAL,
+                ),
             };
-            match column {
-                Column::Number(v) => out
-                    .typed::<DoubleType>()
-                    .write_batch(&v[rows.clone()], None, None)?,
-                Column::Integer(v) => out
-                    .typed::<Int64Type>()
-                    .write_batch(&v[rows.clone()], None, None)?,
-                Column::Text(v) => {
-                    let levels: Vec<i16> = v[rows.clone()].iter().map(|t| i16::from(t.is_some())).collect();
-                    let values: Vec<ByteArray> = v[rows.clone()]
-                        .iter()
-                        .flatten()
-                        .map(|t| t.as_str().into())
-                        .collect();
-                    out.typed::<ByteArrayType>()
-                        .write_batch(&values, Some(&levels), None)?
-                }
-            };
-            out.close()?;
-        }
-        group.close()?;
-        start = rows.end;
+            Type::primitive_type_builder(name, physical)
+                .with_repetition(repetition)
+                .with_logical_type(logical)
+                .build()
+                .map(Arc::new)
+        });
+        let schema = Type::group_type_builder("schema")
+            .with_fields(fields.collect::<Result<_, _>>()?)
+            .build()?;
+        let pairs = first
+            .metadata
+            .iter()
+            .map(|(k, v)| KeyValue::new(k.clone(), v.clone()))
+            .collect();
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
+            .set_key_value_metadata(Some(pairs))
+            .build();
+        let writer = SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties))?;
+        Ok(Self { writer })
     }
-    writer.into_inner()
+
+    pub(super) fn append(&mut self, frame: &Frame) -> parquet::errors::Result<()> {
+        let mut start = 0;
+        while start < frame.n_rows() {
+            let rows = start..(start + ROWS_PER_GROUP).min(frame.n_rows());
+            let mut group = self.writer.next_row_group()?;
+            for (_, column) in frame.columns() {
+                let Some(mut out) = group.next_column()? else {
+                    break;
+                };
+                match column {
+                    Column::Number(v) => {
+                        out.typed::<DoubleType>()
+                            .write_batch(&v[rows.clone()], None, None)?
+                    }
+                    Column::Integer(v) => {
+                        out.typed::<Int64Type>()
+                            .write_batch(&v[rows.clone()], None, None)?
+                    }
+                    Column::Text(v) => {
+                        let levels: Vec<i16> =
+                            v[rows.clone()].iter().map(|t| i16::from(t.is_some())).collect();
+                        let values: Vec<ByteArray> = v[rows.clone()]
+                            .iter()
+                            .flatten()
+                            .map(|t| t.as_str().into())
+                            .collect();
+                        out.typed::<ByteArrayType>()
+                            .write_batch(&values, Some(&levels), None)?
+                    }
+                };
+                out.close()?;
+            }
+            group.close()?;
+            start = rows.end;
+        }
+        Ok(())
+    }
+
+    pub(super) fn into_inner(self) -> parquet::errors::Result<W> {
+        self.writer.into_inner()
+    }
 }
 
 pub(super) fn read_metadata(bytes: Vec<u8>) -> Result<BTreeMap<String, String>, Error> {

@@ -1,15 +1,15 @@
 //! Hands meet objects: `grasps/HAND/OBJECT.parquet` and `OBJECT.rejected.json`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use prehend_grasp::{SynthesisOptions, synthesize};
+use prehend_grasp::{Grasp, SynthesisOptions, synthesize, synthesize_each};
 use prehend_hand::Hand;
 use serde::{Deserialize, Serialize};
 
 use super::decompose::Shape;
 use crate::files::{self, Fingerprint};
-use crate::frame::Frame;
+use crate::frame::{Frame, TableWriter};
 use crate::grasp_table::{TableContext, to_frame};
 use crate::progress::Watch;
 use crate::{Error, hand_folder};
@@ -200,6 +200,106 @@ pub fn grasp(
         rejected,
     };
     Ok((to_frame(&context, &synthesis.grasps), tries))
+}
+
+/// Grasps of one hand on one object, straight to a table: any number of tries needs the memory of a row group.
+///
+/// Without `table` the grasps are only counted.
+///
+/// # Errors
+///
+/// As [`grasp`], and what the disk says of the table.
+pub fn grasp_to(
+    hand: &HandData,
+    shape: &Shape,
+    options: &SynthesisOptions,
+    table: Option<TableWriter>,
+    watch: Watch,
+) -> Result<Harvest, Error> {
+    let grasp_object = shape.grasp_object()?;
+    let options = SynthesisOptions {
+        stream: stream(hand.hand.name(), &shape.object.name),
+        ..options.clone()
+    };
+    let context = TableContext {
+        hand: &hand.hand,
+        hand_path: &hand.path,
+        object: &shape.object,
+        grasp_object: &grasp_object,
+        seed: options.seed,
+    };
+    let mut table = table;
+    let mut failure = None;
+    let (mut waiting, mut sum, mut directions) = (Vec::new(), 0.0, BTreeSet::new());
+    let mut put = |grasps: &mut Vec<Grasp>| {
+        if let Some(table) = &mut table {
+            failure = table.append(&to_frame(&context, grasps)).err();
+        }
+        grasps.clear();
+        failure.is_none()
+    };
+    // The first part gives the table its columns, rows or not.
+    let mut fine = put(&mut waiting);
+    let report = |_finished: usize| {
+        watch.progress.advance(1);
+        watch.check().is_ok()
+    };
+    let mut each = |grasp: Grasp| {
+        sum += grasp.features.qeps;
+        directions.insert(direction_cell(&grasp.features.upos));
+        waiting.push(grasp);
+        if waiting.len() == PART {
+            fine = put(&mut waiting);
+        }
+        fine
+    };
+    let tally = synthesize_each(&hand.hand, &grasp_object, &options, None, &report, &mut each);
+    put(&mut waiting);
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+    watch.check()?;
+    let tally = tally.map_err(|e| Error::file(&shape.object.path, e))?;
+    table.map_or(Ok(()), TableWriter::finish)?;
+    Ok(Harvest {
+        tries: Tries {
+            tried: tally.tried,
+            kept: tally.kept,
+            rejected: tally.rejected.iter().map(|(r, n)| (r.to_string(), *n)).collect(),
+        },
+        hints: tally.rejected.keys().map(|r| (r.to_string(), r.hint())).collect(),
+        mean_epsilon: if tally.kept == 0 {
+            0.0
+        } else {
+            sum / tally.kept as f64
+        },
+        directions: directions.len() as f64 / N_DIRECTIONS as f64,
+    })
+}
+
+/// What [`grasp_to`] has to say of the grasps that it wrote.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Harvest {
+    /// How the tries went.
+    pub tries: Tries,
+    /// What to change where a reason is frequent.
+    pub hints: BTreeMap<String, &'static str>,
+    /// Mean ε; 0 without grasps.
+    pub mean_epsilon: f64,
+    /// Share of 96 equal parts of the sphere from which some grasp comes (`upos`).
+    pub directions: f64,
+}
+
+/// Grasps that wait to become rows.
+const PART: usize = 1000;
+
+const N_DIRECTIONS: usize = 96;
+
+/// Which of 8 × 12 parts of the sphere, equal in area, a unit vector lies in.
+fn direction_cell(upos: &[f64; 3]) -> (usize, usize) {
+    let turn = upos[1].atan2(upos[0]) / std::f64::consts::TAU + 0.5;
+    let height = f64::midpoint(upos[2], 1.0);
+    (((height * 8.0) as usize).min(7), ((turn * 12.0) as usize).min(11))
 }
 
 /// Names a hand and an object for the planner, so that each pair draws its own numbers.
