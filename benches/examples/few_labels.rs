@@ -122,7 +122,9 @@ fn mean(members: &[Model], seen: &[&str], test: &Table, weighted: bool) -> Resul
                 *sum += weight * p;
             }
         }
-        sum.iter_mut().for_each(|p| *p /= total);
+        for p in sum.iter_mut() {
+            *p /= total;
+        }
     }
     Ok(sums)
 }
