@@ -7,6 +7,7 @@ use crate::output::Outcome;
 
 mod close;
 mod decompose;
+mod export;
 mod free_volume;
 mod grasps;
 mod hand;
@@ -58,6 +59,8 @@ pub enum Command {
     Imitate(imitate::Arguments),
     /// List, filter and convert grasps
     Grasps(grasps::Arguments),
+    /// Write grasps in the formats of other programs
+    Export(export::Arguments),
     /// Size and cvex, with their uncertainty, of an object seen from one side only
     PartialView(partial_view::Arguments),
     /// Convert models
@@ -83,6 +86,7 @@ impl Command {
             Self::Query(a) => a.run(json),
             Self::Imitate(a) => a.run(json),
             Self::Grasps(a) => a.run(json),
+            Self::Export(a) => a.run(json),
             Self::PartialView(a) => a.run(json),
             Self::Model(a) => a.run(json),
         }

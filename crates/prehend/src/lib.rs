@@ -5,6 +5,7 @@
 
 pub mod error;
 pub mod experiments;
+pub mod export;
 pub mod files;
 pub mod frame;
 pub mod grasp_table;

@@ -1,9 +1,11 @@
 //! `prehend grasps FILE…`
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use prehend::frame::{Column, Frame};
+use prehend::labels::LabelStore;
 use serde_json::{Map, Value, json};
 
 use crate::output::{self, Outcome};
@@ -18,6 +20,21 @@ pub struct Arguments {
     #[arg(required = true)]
     files: Vec<PathBuf>,
 
+    #[command(flatten)]
+    filter: Filter,
+
+    /// How rows are printed
+    #[arg(long, value_enum, default_value = "json")]
+    format: Format,
+
+    /// Write the rows to a table (.parquet, .csv, .jsonl) instead of printing them
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// Which grasps of the tables are meant.
+#[derive(clap::Args)]
+pub struct Filter {
     /// Only grasps on this object
     #[arg(long)]
     object: Option<String>,
@@ -34,17 +51,29 @@ pub struct Arguments {
     #[arg(long)]
     min_epsilon: Option<f64>,
 
+    /// Only grasps with at most this epsilon
+    #[arg(long)]
+    max_epsilon: Option<f64>,
+
+    /// Only grasps whose label says that they suit this task; needs --labels
+    #[arg(long, requires = "labels")]
+    task: Option<String>,
+
+    /// The labels that --task asks
+    #[arg(long)]
+    labels: Option<PathBuf>,
+
+    /// Whose labels
+    #[arg(long, default_value = "strict", requires = "labels")]
+    persona: String,
+
+    /// Only so many with the largest epsilon, best first
+    #[arg(long)]
+    top: Option<usize>,
+
     /// At most this many rows
     #[arg(long)]
     limit: Option<usize>,
-
-    /// How rows are printed
-    #[arg(long, value_enum, default_value = "json")]
-    format: Format,
-
-    /// Write the rows to a table (.parquet, .csv, .jsonl) instead of printing them
-    #[arg(long)]
-    out: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -55,8 +84,7 @@ enum Format {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        let frame = read_tables(&self.files)?;
-        let rows = self.matching(&frame).with_context(|| listed(&self.files))?;
+        let (frame, rows) = self.filter.read(&self.files)?;
         let chosen = frame.select(&rows);
         if let Some(out) = &self.out {
             chosen.write(out)?;
@@ -80,6 +108,44 @@ impl Arguments {
         }
         Ok(Outcome::Done)
     }
+}
+
+impl Filter {
+    /// All tables as one, and the rows that are meant.
+    pub fn read(&self, files: &[PathBuf]) -> Result<(Frame, Vec<usize>)> {
+        let frame = read_tables(files)?;
+        let rows = self.matching(&frame).with_context(|| listed(files))?;
+        Ok((frame, rows))
+    }
+
+    /// Grasps that this persona's labels call suited to a task.
+    fn suiting(&self, task: &str, labels: &Path) -> Result<BTreeSet<String>> {
+        if !labels.is_file() {
+            bail!(
+                "{}: is not there; write labels with `prehend label`",
+                output::shown(labels)
+            );
+        }
+        let answers = LabelStore::open(labels)?.answers(&self.persona, &[])?;
+        let known: BTreeSet<&str> = answers.values().flatten().map(|a| a.task.as_str()).collect();
+        if !known.contains(task) {
+            let known: Vec<&str> = known.into_iter().collect();
+            bail!(
+                "{}: holds no labels of persona `{}` for task `{task}`; it has {}",
+                output::shown(labels),
+                self.persona,
+                if known.is_empty() {
+                    "none of that persona".to_owned()
+                } else {
+                    known.join(", ")
+                }
+            );
+        }
+        let suited = answers
+            .into_iter()
+            .filter(|(_, answers)| answers.iter().any(|a| a.yes && a.task == task));
+        Ok(suited.map(|(grasp, _)| grasp).collect())
+    }
 
     fn matching(&self, frame: &Frame) -> Result<Vec<usize>> {
         let mut rows: Vec<usize> = (0..frame.n_rows()).collect();
@@ -96,6 +162,21 @@ impl Arguments {
         if let Some(least) = self.min_epsilon {
             let epsilon = frame.numbers("qeps")?;
             rows.retain(|&r| epsilon[r] >= least);
+        }
+        if let Some(most) = self.max_epsilon {
+            let epsilon = frame.numbers("qeps")?;
+            rows.retain(|&r| epsilon[r] <= most);
+        }
+        if let (Some(task), Some(labels)) = (&self.task, &self.labels) {
+            let suits = self.suiting(task, labels)?;
+            let ids = frame.texts("grasp_id")?;
+            rows.retain(|&r| suits.contains(&ids[r]));
+        }
+        if let Some(top) = self.top {
+            let epsilon = frame.numbers("qeps")?;
+            // Stable: of equals, the first.
+            rows.sort_by(|&a, &b| epsilon[b].total_cmp(&epsilon[a]));
+            rows.truncate(top);
         }
         rows.truncate(self.limit.unwrap_or(usize::MAX));
         Ok(rows)

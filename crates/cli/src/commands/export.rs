@@ -1,0 +1,148 @@
+//! `prehend export FILE…`
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use prehend::export::{ServoGains, convex_pieces, exported, grasp_json, isaac_yaml, mjcf_scene, moveit_yaml};
+use prehend::files;
+use prehend::frame::Frame;
+use prehend::hand_folder::read_described_hand;
+use prehend::object::{Object, ObjectOptions};
+use serde_json::{Value, json};
+
+use super::grasps::Filter;
+use crate::output::{self, Outcome};
+
+/// Write grasps in the formats of other programs
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  prehend export out/grasps/human --object coffee_mug --top 20 --format mjcf --out scenes"
+)]
+pub struct Arguments {
+    /// Grasp tables (.parquet, .csv, .jsonl) or folders of them
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+
+    #[command(flatten)]
+    filter: Filter,
+
+    /// What is written
+    #[arg(long, value_enum)]
+    format: Format,
+
+    /// The folder that gets the files: one for each hand and object, with mjcf one for each grasp
+    #[arg(long)]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Format {
+    /// All of it: pre-grasp, grasp, squeeze, contacts
+    Json,
+    /// The table's columns
+    Csv,
+    /// Scenes for MuJoCo, one for each grasp
+    Mjcf,
+    /// `isaac_grasp` files, version 1.0
+    Isaac,
+    /// Lists of `moveit_msgs/Grasp`
+    Moveit,
+}
+
+impl Arguments {
+    pub fn run(self, json: bool) -> Result<Outcome> {
+        let (frame, rows) = self.filter.read(&self.files)?;
+        if rows.is_empty() {
+            bail!("no grasp is left by the filters; leave some out, or see `prehend grasps`");
+        }
+        // A file holds the grasps of one hand on one object.
+        let mut groups: BTreeMap<(String, String), Vec<usize>> = BTreeMap::new();
+        let (hands, meshes) = (frame.texts("hand_path")?, frame.texts("mesh")?);
+        for row in rows {
+            groups
+                .entry((hands[row].clone(), meshes[row].clone()))
+                .or_default()
+                .push(row);
+        }
+        let (mut written, mut deviations) = (Vec::new(), BTreeMap::new());
+        let mut n_grasps = 0;
+        for ((hand, mesh), rows) in groups {
+            n_grasps += rows.len();
+            let table = frame.select(&rows);
+            let made = self.group(&table, Path::new(&hand), Path::new(&mesh), &mut deviations);
+            written.extend(made.with_context(|| format!("grasps of {hand} on {mesh}"))?);
+        }
+        let mut answer = json!({ "grasps": n_grasps, "files": written });
+        if self.format == Format::Mjcf {
+            answer["volume_deviation"] = json!(deviations);
+        }
+        output::answer(json, &answer, text)?;
+        Ok(Outcome::Done)
+    }
+
+    fn group(
+        &self,
+        table: &Frame,
+        hand: &Path,
+        mesh: &Path,
+        deviations: &mut BTreeMap<String, f64>,
+    ) -> Result<Vec<String>> {
+        let object = &table.texts("object")?[0];
+        let name = format!("{}_{object}", table.texts("hand")?[0]);
+        let mut written = Vec::new();
+        let mut write = |name: String, text: &[u8]| -> Result<()> {
+            files::write(&self.out.join(&name), text)?;
+            written.push(name);
+            Ok(())
+        };
+        if self.format == Format::Csv {
+            write(format!("{name}.csv"), &table.to_csv()?)?;
+            return Ok(written);
+        }
+        let hand = read_described_hand(hand)?;
+        let grasps = exported(table, &hand)?;
+        match self.format {
+            Format::Json => {
+                let list: Vec<Value> = grasps.iter().map(|g| grasp_json(&hand, g)).collect();
+                let file = json!({
+                    "format": "prehend-grasps", "version": 1, "object": object, "mesh": mesh, "grasps": list,
+                });
+                write(format!("{name}.json"), &serde_json::to_vec_pretty(&file)?)?;
+            }
+            Format::Isaac => write(
+                format!("{name}.isaac.yaml"),
+                isaac_yaml(&hand, object, &grasps)?.as_bytes(),
+            )?,
+            Format::Moveit => write(
+                format!("{name}.moveit.yaml"),
+                moveit_yaml(&hand, object, &grasps)?.as_bytes(),
+            )?,
+            Format::Mjcf => {
+                let body = Object::read(mesh, ObjectOptions::default())?;
+                let pieces = convex_pieces(&body.mesh);
+                deviations.insert(object.clone(), pieces.volume_deviation);
+                for grasp in &grasps {
+                    let scene = mjcf_scene(&hand, &body, &pieces, grasp, ServoGains::default())?;
+                    let id = grasp.record.grasp_id.replace(['/', '\\'], "_");
+                    write(format!("{id}.xml"), scene.as_bytes())?;
+                }
+            }
+            Format::Csv => {}
+        }
+        Ok(written)
+    }
+}
+
+fn text(answer: &Value) -> String {
+    let mut out = format!(
+        "{} grasps in {} files\n",
+        answer["grasps"],
+        answer["files"].as_array().map_or(0, Vec::len)
+    );
+    for (object, deviation) in answer["volume_deviation"].as_object().into_iter().flatten() {
+        let percent = 100.0 * deviation.as_f64().unwrap_or(0.0);
+        out += &format!("  {object}: convex pieces have {percent:.1} % more volume than the mesh\n");
+    }
+    out
+}
