@@ -355,7 +355,7 @@ impl<'a> Scene<'a> {
                 Solid::Sphere { radius } => shape("sphere", radius.to_string()),
                 Solid::Capsule { half_length, radius } => shape("capsule", format!("{radius} {half_length}")),
                 Solid::Cylinder { half_length, radius } => {
-                    shape("cylinder", format!("{radius} {half_length}"))
+                    shape("cylinder", format!("{radius} {half_length}"));
                 }
                 Solid::Cuboid { half_extents: h } => shape("box", format!("{} {} {}", h.x, h.y, h.z)),
                 Solid::Hull(_) | Solid::Mesh(_) => {
