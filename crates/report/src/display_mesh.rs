@@ -126,30 +126,13 @@ fn creases(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use prehend_geometry::OrientedBox;
 
-    fn cube() -> TriMesh {
-        let vertices = (0..8)
-            .map(|i| Point3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64))
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-            .collect();
-        TriMesh::new(vertices, triangles).unwrap()
-    }
+    use super::*;
 
     #[test]
     fn a_cube_keeps_flat_faces_and_shows_its_twelve_edges() {
-        let cube = DisplayMesh::new(&cube());
+        let cube = DisplayMesh::new(&OrientedBox::centered([1.0; 3]).surface());
         for normals in &cube.normals {
             assert!(normals.iter().all(|n| (n.abs().max() - 1.0).abs() < 1e-12));
         }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend_geometry::{OrientedBox, TriMesh};
+use prehend_geometry::OrientedBox;
 
 use crate::display_mesh::DisplayMesh;
 
@@ -86,27 +86,12 @@ impl Scene {
                 }
             }
         }
-        let quads = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        if let Ok(mesh) = TriMesh::new(corners.to_vec(), triangles) {
-            let mesh = Arc::new(DisplayMesh::new(&mesh));
-            self.bodies.push(Body {
-                mesh,
-                pose: Isometry3::identity(),
-                color,
-                opacity: 0.10,
-            });
-        }
+        self.bodies.push(Body {
+            mesh: Arc::new(DisplayMesh::new(&solid.surface())),
+            pose: Isometry3::identity(),
+            color,
+            opacity: 0.10,
+        });
     }
 
     /// Adds an arrow from `from` along `along`, whose length is the arrow's.

@@ -323,30 +323,9 @@ mod tests {
 
     /// A box with these corners, of twelve triangles.
     fn block(low: [f64; 3], high: [f64; 3]) -> TriMesh {
-        let mesh = OrientedBox::new(
-            Point3::from((Vector3::from(low) + Vector3::from(high)) / 2.0),
-            Rotation3::identity(),
-            Vector3::from(high) - Vector3::from(low),
-        )
-        .unwrap();
-        let corner = |i: usize| {
-            let half = mesh.extents() / 2.0;
-            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            mesh.center() + Vector3::new(sign(0) * half.x, sign(1) * half.y, sign(2) * half.z)
-        };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .collect();
-        TriMesh::new((0..8).map(corner).collect(), triangles).unwrap()
+        let (low, high) = (Vector3::from(low), Vector3::from(high));
+        let solid = OrientedBox::new(((low + high) / 2.0).into(), Rotation3::identity(), high - low);
+        solid.unwrap().surface()
     }
 
     /// Two bodies in one mesh.
