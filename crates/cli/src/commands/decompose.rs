@@ -20,7 +20,7 @@ use crate::output::{self, Outcome, Usage};
 const PICTURE: usize = 320;
 
 /// Dots in the picture of a cloud.
-const MAX_DOTS: usize = 4000;
+const MAX_DOTS: usize = 1500;
 
 /// The object in a picture (sRGB).
 const GREY: [u8; 3] = [190, 190, 190];
@@ -165,7 +165,7 @@ fn picture(shape: &Shape, found: &Decomposition) -> Result<Vec<u8>> {
             let step = points.len().div_ceil(MAX_DOTS);
             scene.dots.extend(points.iter().step_by(step).map(|&center| Dot {
                 center,
-                radius: 0.4,
+                radius: 1.0,
                 color: GREY,
             }));
         }
