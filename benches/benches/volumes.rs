@@ -74,8 +74,23 @@ fn volumes(c: &mut Criterion) {
             (Tetrahedron([0; 4].map(corner)), unit)
         })
         .collect();
+    // The same with the fourth corner brought near the plane of the others.
+    let flattened = |share: f64| -> Vec<(Tetrahedron, OrientedBox)> {
+        let flat = |(t, unit): &(Tetrahedron, OrientedBox)| {
+            let [a, b, c, d] = t.0;
+            let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+            (Tetrahedron([a, b, c, middle + (d - middle) * share]), *unit)
+        };
+        random.iter().map(flat).collect()
+    };
+    let (flat, very_flat) = (flattened(1e-3), flattened(1e-6));
     println!("{} grasps, {} pairs", grasps.len(), pairs.len());
-    for (name, pairs) in [("grasps_and_boxes", &pairs), ("random_and_unit_box", &random)] {
+    for (name, pairs) in [
+        ("grasps_and_boxes", &pairs),
+        ("random_and_unit_box", &random),
+        ("flat_and_unit_box", &flat),
+        ("very_flat_and_unit_box", &very_flat),
+    ] {
         c.bench_function(&format!("intersection_volume/{name}/{}", pairs.len()), |b| {
             let mut next = pairs.iter().cycle();
             b.iter(|| {
