@@ -87,7 +87,7 @@ pub fn free_volume(palm: &Point3<f64>, contacts: &[Point3<f64>], boxes: &[Orient
     free_volume_with(palm, contacts, boxes, all, union_volume(boxes))
 }
 
-/// [`free_volume`] with the convex hull of the palm and all contacts for Δ: what the whole hand encloses.
+/// `fvol` of [`free_volume`] with the convex hull of the palm and all contacts for Δ: what the whole hand encloses.
 ///
 /// At most what [`free_volume`] gives, in [0, 1]; 1 where palm and contacts lie in one plane or are fewer than four, where
 /// one of them is not finite, and for an object without boxes. The order of the contacts does not matter beyond rounding.
@@ -101,22 +101,16 @@ pub fn free_volume(palm: &Point3<f64>, contacts: &[Point3<f64>], boxes: &[Orient
 /// let palm = Point3::new(0.5, 0.5, 1.0);
 /// let contacts = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Point3::new(x, y, 0.0));
 /// let of_hull = prehend_grasp::free_volume_of_hull(&palm, &contacts, &[cube]);
-/// assert!((of_hull.fvol - 2.0 / 3.0).abs() < 1e-12);
+/// assert!((of_hull - 2.0 / 3.0).abs() < 1e-12);
 /// assert!((prehend_grasp::free_volume(&palm, &contacts, &[cube]).fvol - 5.0 / 6.0).abs() < 1e-12);
 /// # Ok::<(), prehend_geometry::GeometryError>(())
 /// ```
-pub fn free_volume_of_hull(
-    palm: &Point3<f64>,
-    contacts: &[Point3<f64>],
-    boxes: &[OrientedBox],
-) -> FreeVolume {
-    let sum: f64 = boxes.iter().map(OrientedBox::volume).sum();
-    let union = union_volume(boxes);
+pub fn free_volume_of_hull(palm: &Point3<f64>, contacts: &[Point3<f64>], boxes: &[OrientedBox]) -> f64 {
+    let all: f64 = boxes.iter().map(OrientedBox::volume).sum();
     let points: Vec<Point3<f64>> = std::iter::once(palm).chain(contacts).copied().collect();
-    let (mut covered, mut covered_once) = (0.0, 0.0);
+    let mut covered = 0.0;
     if let Ok(hull) = convex_hull(&points)
         && hull.rank() == 3
-        && sum > 0.0
     {
         // Faces and one corner span tetrahedra that share faces only; those of the corner's own faces are flat.
         let apex = hull.points()[0];
@@ -124,19 +118,12 @@ pub fn free_volume_of_hull(
             let [a, b, c] = face.map(|i| hull.points()[i as usize]);
             let part = Tetrahedron([apex, a, b, c]);
             covered += boxes.iter().map(|b| part.intersection_volume(b)).sum::<f64>();
-            covered_once += part.union_volume(boxes);
         }
     }
-    let free = |covered: f64, all: f64| {
-        if covered > 0.0 {
-            (1.0 - covered / all).clamp(0.0, 1.0)
-        } else {
-            1.0
-        }
-    };
-    FreeVolume {
-        fvol: free(covered, sum),
-        fvol_union: free(covered_once, union),
+    if covered > 0.0 {
+        (1.0 - covered / all).clamp(0.0, 1.0)
+    } else {
+        1.0
     }
 }
 
@@ -244,22 +231,21 @@ mod tests {
             })
             .collect();
         let of_hull = free_volume_of_hull(&palm, &contacts, &[cube]);
-        assert!(of_hull.fvol < free_volume(&palm, &contacts, &[cube]).fvol - 0.01);
+        assert!(of_hull < free_volume(&palm, &contacts, &[cube]).fvol - 0.01);
         let mut reversed = contacts.clone();
         reversed.reverse();
-        assert!((free_volume_of_hull(&palm, &reversed, &[cube]).fvol - of_hull.fvol).abs() < 1e-12);
+        assert!((free_volume_of_hull(&palm, &reversed, &[cube]) - of_hull).abs() < 1e-12);
         // Three contacts span the tetrahedron itself.
         let three = &contacts[..3];
         let same = free_volume(&palm, three, &[cube, cube]);
-        assert!((free_volume_of_hull(&palm, three, &[cube, cube]).fvol - same.fvol).abs() < 1e-12);
+        assert!((free_volume_of_hull(&palm, three, &[cube, cube]) - same.fvol).abs() < 1e-12);
         let flat: Vec<_> = contacts.iter().map(|p| Point3::new(p.x, p.y, 0.07)).collect();
         for (contacts, boxes) in [
             (&flat[..], &[cube][..]),
             (&contacts[..2], &[cube]),
             (&contacts, &[]),
         ] {
-            let free = free_volume_of_hull(&palm, contacts, boxes);
-            assert_eq!((free.fvol, free.fvol_union), (1.0, 1.0));
+            assert_eq!(free_volume_of_hull(&palm, contacts, boxes), 1.0);
         }
     }
 }

@@ -21,7 +21,7 @@ pub struct Arguments {
     /// JSON lines: tetrahedron (or palm and contacts) and boxes; - is standard input
     file: PathBuf,
 
-    /// Also `fvol_hull`, of the hull of palm and all contacts, where these are given (slow)
+    /// Also `fvol_hull`, of the hull of palm and all contacts, where these are given
     #[arg(long)]
     hull: bool,
 }
@@ -37,11 +37,34 @@ struct Line {
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
-        output::each_json_line(json, &self.file, |v| free_volume(v, self.hull), output::plain)
+        let mut union = UnionOfBoxes::default();
+        output::each_json_line(
+            json,
+            &self.file,
+            |v| free_volume(v, self.hull, &mut union),
+            output::plain,
+        )
     }
 }
 
-fn free_volume(value: Value, hull: bool) -> Result<Value> {
+/// The volume of the last line's boxes: lines about one object follow each other.
+#[derive(Default)]
+struct UnionOfBoxes {
+    boxes: Vec<OrientedBox>,
+    volume: f64,
+}
+
+impl UnionOfBoxes {
+    fn volume(&mut self, boxes: &[OrientedBox]) -> f64 {
+        if self.boxes != boxes {
+            self.boxes = boxes.to_vec();
+            self.volume = union_volume(boxes);
+        }
+        self.volume
+    }
+}
+
+fn free_volume(value: Value, hull: bool, union: &mut UnionOfBoxes) -> Result<Value> {
     let line: Line =
         serde_json::from_value(value).context("expected tetrahedron or palm and contacts, and boxes")?;
     if line.boxes.is_empty() {
@@ -52,7 +75,7 @@ fn free_volume(value: Value, hull: bool) -> Result<Value> {
         (None, Some(palm), Some(contacts)) => {
             let palm = Point3::from(palm);
             let contacts: Vec<Point3<f64>> = contacts.into_iter().map(Point3::from).collect();
-            let of_hull = hull.then(|| free_volume_of_hull(&palm, &contacts, &line.boxes).fvol);
+            let of_hull = hull.then(|| free_volume_of_hull(&palm, &contacts, &line.boxes));
             (largest_tetrahedron(palm, &contacts), of_hull)
         }
         _ => bail!("expected either `tetrahedron`, or `palm` and `contacts`"),
@@ -73,7 +96,7 @@ fn free_volume(value: Value, hull: bool) -> Result<Value> {
         .collect();
     let occupied: f64 = per_box.iter().sum();
     let occupied_once = tetrahedron.map_or(0.0, |t| t.union_volume(&line.boxes));
-    let fvol_union = 1.0 - occupied_once / union_volume(&line.boxes);
+    let fvol_union = 1.0 - occupied_once / union.volume(&line.boxes);
     let mut answer = json!({
         "tetrahedron": tetrahedron.map_or(0.0, |t| t.volume()),
         "occupied": occupied,
