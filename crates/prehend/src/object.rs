@@ -168,7 +168,16 @@ impl Object {
                 ),
             )
         })?;
-        let FileShape { shape, stated } = read_with_files_beside(path, format)?;
+        Self::of_shape(path, read_with_files_beside(path, format)?, options)
+    }
+
+    /// [`Object::read`] of a file whose shape has been read already.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Object::read`].
+    pub fn of_shape(path: &Path, read: FileShape, options: ObjectOptions) -> Result<Self, Error> {
+        let FileShape { shape, stated } = read;
         let Shape::Mesh(raw) = shape else {
             return Err(Error::file(
                 path,

@@ -52,7 +52,11 @@ fn facts(file: &Path, options: &ShapeOptions) -> Result<Value> {
     // A flat cloud has no hull volume; that is a fact, not a failure.
     let hull_volume = convex_hull(points).map_or(0.0, |hull| hull.volume());
     let bounding_box = minimum_volume_box(points).with_context(|| output::shown(file))?;
-    let mended = mesh.map(|m| repair(m.clone()));
+    // What stands in an object's place has been mended already.
+    let mended = mesh.map(|m| match input.repairs {
+        Some(repairs) => (m.clone(), repairs),
+        None => repair(m.clone()),
+    });
     let report = mended.as_ref().map(|(mesh, _)| inspect(mesh));
     let volume = mended.as_ref().map(|(mesh, _)| enclosed_volume(mesh));
     let mut answer = json!({
@@ -66,7 +70,7 @@ fn facts(file: &Path, options: &ShapeOptions) -> Result<Value> {
         "boundary_edges": report.as_ref().map_or(0, |r| r.boundary_edges),
         "non_manifold_edges": report.as_ref().map_or(0, |r| r.non_manifold_edges),
         "holes": report.as_ref().map_or(&[][..], |r| &r.holes),
-        "repairs": input.repairs.as_ref().or(mended.as_ref().map(|(_, repairs)| repairs)),
+        "repairs": mended.as_ref().map(|(_, repairs)| repairs),
         "hull_volume": hull_volume,
         "bounding_box": {
             "center": bounding_box.center.coords.as_slice(),

@@ -147,7 +147,7 @@ pub fn read(path: &Path, options: &ShapeOptions) -> Result<Input> {
     };
     let flags = options.placement.object_options();
     if matches!(shape, Shape::Mesh(_)) && !flags.as_is && path.with_extension("toml").is_file() {
-        let object = Object::read(path, flags)?;
+        let object = Object::of_shape(path, FileShape { shape, stated }, flags)?;
         let input = placed(
             Shape::Mesh(object.mesh),
             &object.placement,
