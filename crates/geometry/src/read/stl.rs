@@ -102,37 +102,40 @@ fn read_ascii(bytes: &[u8]) -> Result<TriMesh, GeometryError> {
     let text = decode(bytes);
     let mut vertices: Vec<Point3<f64>> = Vec::new();
     let mut faces = Faces::default();
+    let mut corners = Vec::new();
     let mut loop_start = None;
     for (line, record) in lines(&text) {
         let place = Place { format: FORMAT, line };
         let mut words = record.split_whitespace();
         while let Some(word) = words.next() {
-            match (word.to_ascii_lowercase().as_str(), loop_start) {
-                ("solid" | "endsolid", None) => break, // the rest of the line is a name
-                ("facet", None) => {
+            let is = |name: &str| word.eq_ignore_ascii_case(name);
+            match loop_start {
+                Some(_) if is("vertex") => vertices.push(place.point(&mut words)?),
+                None if is("endfacet") => {}
+                None if is("solid") || is("endsolid") => break, // the rest of the line is a name
+                None if is("facet") => {
                     place.word(words.next(), "normal")?;
                     // Normals may be anything, also `nan`, since nothing depends on them.
                     for _ in 0..3 {
                         place.word(words.next(), "the facet's normal")?;
                     }
                 }
-                ("outer", None) => {
+                None if is("outer") => {
                     place.word(words.next(), "loop")?;
                     loop_start = Some(vertices.len());
                 }
-                ("vertex", Some(_)) => vertices.push(place.point(&mut words)?),
-                ("endloop", Some(start)) => {
+                Some(start) if is("endloop") => {
                     if vertices.len() - start < 3 {
                         let found = format!("endloop after {} vertices", vertices.len() - start);
                         return Err(place.error(&found, "three vertices"));
                     }
-                    let corners: Vec<u32> = (start as u32..vertices.len() as u32).collect();
+                    corners.clear();
+                    corners.extend(start as u32..vertices.len() as u32);
                     faces.push(&corners);
                     loop_start = None;
                 }
-                ("endfacet", None) => {}
-                (_, Some(_)) => return Err(place.error(word, "vertex or endloop")),
-                (_, None) => return Err(place.error(word, STATEMENT)),
+                Some(_) => return Err(place.error(word, "vertex or endloop")),
+                None => return Err(place.error(word, STATEMENT)),
             }
         }
     }

@@ -19,7 +19,8 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut rest = Some(text);
     std::iter::from_fn(move || {
         let text = rest?;
-        let Some(end) = text.find(['\n', '\r']) else {
+        // No other character has these bytes in it.
+        let Some(end) = text.bytes().position(|b| b == b'\n' || b == b'\r') else {
             rest = None;
             return (!text.is_empty()).then_some(text);
         };
