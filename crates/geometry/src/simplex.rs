@@ -22,15 +22,19 @@ pub(crate) struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// How far inside each corner is, in units of the normal's length. What rounding could have made counts as 0, so
-    /// that faces in one plane leave no slivers behind, which further cuts would multiply.
-    fn depths(&self, simplex: &Simplex) -> [f64; 4] {
-        simplex.map(|p| {
-            let terms = self.normal.component_mul(&p);
-            let depth = self.offset - terms.sum();
-            let rounding = 4.0 * f64::EPSILON * (self.offset.abs() + terms.abs().sum());
-            if depth.abs() <= rounding { 0.0 } else { depth }
-        })
+    /// How far inside a point is, in units of the normal's length. What rounding could have made counts as 0, so that
+    /// faces in one plane leave no slivers behind, which further cuts would multiply.
+    #[inline]
+    fn depth(&self, p: &Vector3<f64>) -> f64 {
+        let [x, y, z] = [self.normal.x * p.x, self.normal.y * p.y, self.normal.z * p.z];
+        let depth = self.offset - (x + y + z);
+        let rounding = 4.0 * f64::EPSILON * (self.offset.abs() + (x.abs() + y.abs() + z.abs()));
+        if depth.abs() <= rounding { 0.0 } else { depth }
+    }
+
+    #[inline]
+    fn depths(&self, [a, b, c, d]: &Simplex) -> [f64; 4] {
+        [self.depth(a), self.depth(b), self.depth(c), self.depth(d)]
     }
 }
 
@@ -48,6 +52,10 @@ pub(crate) fn split(
     outside: &mut Vec<Simplex>,
 ) {
     let depths = plane.depths(simplex);
+    if depths.iter().all(|&s| s >= 0.0) {
+        inside.push(*simplex);
+        return;
+    }
     // Corners inside first; a corner on the plane counts as inside.
     let mut order = [0, 1, 2, 3];
     order.sort_by_key(|&i| depths[i] < 0.0);
@@ -58,7 +66,6 @@ pub(crate) fn split(
     let cut = |i: usize, j: usize| p[i] + (p[j] - p[i]) * (s[i] / (s[i] - s[j]));
     match n_inside {
         0 => push(outside, *simplex),
-        4 => push(inside, *simplex),
         1 => {
             let [ab, ac, ad] = [cut(0, 1), cut(0, 2), cut(0, 3)];
             push(inside, [p[0], ab, ac, ad]);
@@ -79,7 +86,7 @@ pub(crate) fn split(
 
 /// Whether no part of the simplex lies strictly inside the half-space.
 pub(crate) fn is_outside(simplex: &Simplex, plane: &HalfSpace) -> bool {
-    plane.depths(simplex).iter().all(|&s| s <= 0.0)
+    simplex.iter().all(|p| plane.depth(p) <= 0.0)
 }
 
 /// The box `|x| ≤ half` as six simplices around one diagonal.
