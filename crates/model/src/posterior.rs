@@ -1,307 +1,320 @@
-//! Exact posteriors by elimination.
-//!
-//! The tables of [`Elimination`] are multiplied and summed over every discrete node that is neither asked about nor a
-//! parent of a block with targets; over the others the sum is written out, and each block with targets adds its
-//! Gaussians. Everything is in the log domain; no sampling, no approximation. Where combinations of components are too
-//! many to be summed, the answer says how far off it can be at most.
+//! Answers: a distribution over states, a mixture of Gaussians, or both together.
 
-use std::collections::{BTreeMap, BTreeSet};
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Map, Value, json};
 
-use nalgebra::DMatrix;
-
-use crate::answer::{Answer, Target};
-use crate::block::{BlockSum, Latent};
-use crate::cpd::{Cpd, MixtureCpd, NodeIdx};
-use crate::elimination::{Elimination, Tables, full_value};
 use crate::error::ModelError;
-use crate::evidence::Evidence;
-use crate::gaussian::{log_add, log_sum_exp};
-use crate::log_table::LogTable;
-use crate::mixture::Term;
-use crate::model::Model;
-use crate::root_gaussian::RootGaussian;
+use crate::gaussian::log_sum_exp;
+use crate::json::rows;
+use crate::mixture::{Mixture, Term, draw};
 
-/// Terms of an answer; the lightest beyond are left out, and count towards the error bound.
-const MAX_TERMS: usize = 2_000_000;
-/// A bound that leaves the answer without meaning.
-const MEANINGLESS: f64 = 0.5;
-/// A bound that one number may hide: what the sums are right to anyway.
-const ROUNDING: f64 = 1e-9;
+/// What was asked about.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Target {
+    /// A discrete node.
+    Discrete {
+        /// Its name.
+        name: String,
+        /// Its states.
+        states: Vec<String>,
+    },
+    /// A continuous node.
+    Continuous {
+        /// Its name.
+        name: String,
+        /// Its columns.
+        columns: Vec<String>,
+        /// Whether its values are unit vectors.
+        sphere: bool,
+    },
+}
 
-impl Model {
-    /// The posterior of one or several nodes given evidence, jointly.
-    ///
-    /// # Errors
-    ///
-    /// Unknown or repeated targets, [`ModelError::NoDensity`] where the evidence meets a singular component,
-    /// [`ModelError::ImpossibleEvidence`], [`ModelError::TooManyTerms`], [`ModelError::Pruned`].
-    ///
-    /// # Source
-    ///
-    /// Eq. 1 and section IV; conditional Gaussians as in Lauritzen (1992).
-    pub fn posterior(&self, targets: &[&str], evidence: &Evidence) -> Result<Answer, ModelError> {
-        let mut asked = Vec::with_capacity(targets.len());
-        for target in targets {
-            let idx = self.index(target)?;
-            if asked.contains(&idx) {
-                return Err(ModelError::BadValue {
-                    node: (*target).into(),
-                    found: "the same target twice".into(),
-                    expected: "each target once".into(),
-                });
-            }
-            if let Cpd::VonMisesFisher(_) = self.node(idx).cpd {
-                return Err(ModelError::BadValue {
-                    node: (*target).into(),
-                    found: "a von_mises_fisher_mixture as one of the targets".into(),
-                    expected: "to be asked about alone, by `direction_posterior`".into(),
-                });
-            }
-            asked.push(idx);
-        }
-        let elimination = Elimination::new(self, &asked, evidence, Latent::Summed);
-        let answer = run(&elimination)?;
-        if answer.error_bound > MEANINGLESS {
-            return Err(ModelError::Pruned {
-                error_bound: answer.error_bound,
-            });
-        }
-        Ok(answer)
-    }
-
-    /// Natural logarithm of the density (and probability) of the evidence.
-    ///
-    /// # Errors
-    ///
-    /// As [`Model::posterior`]; [`ModelError::Pruned`] where it could only be bounded.
-    pub fn log_evidence(&self, evidence: &Evidence) -> Result<f64, ModelError> {
-        let answer = self.posterior(&[], evidence)?;
-        answer.exact()?;
-        Ok(answer.log_evidence)
-    }
+/// The posterior of the targets, jointly and exactly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// Natural logarithm of the density of the evidence.
+    pub log_evidence: f64,
+    /// What was asked about.
+    pub targets: Vec<Target>,
+    /// The joint distribution: with only discrete targets one term for each joint state that is possible.
+    pub terms: Vec<Term>,
+    /// Most that any probability of this answer can be off, because combinations of components were too many to be
+    /// summed; 0 where the answer is exact. The density of the evidence is at most 1 / (1 − bound) times what
+    /// `log_evidence` says.
+    pub error_bound: f64,
 }
 
 impl Answer {
-    /// Refuses an answer that is only bounded.
-    pub(crate) fn exact(&self) -> Result<(), ModelError> {
-        if self.error_bound > ROUNDING {
-            return Err(ModelError::Pruned {
-                error_bound: self.error_bound,
-            });
+    pub(crate) fn new(log_evidence: f64, targets: Vec<Target>, terms: Vec<Term>, error_bound: f64) -> Self {
+        let continuous = targets
+            .iter()
+            .any(|target| matches!(target, Target::Continuous { .. }));
+        let terms = if continuous { terms } else { merge(terms) };
+        Self {
+            log_evidence,
+            targets,
+            terms,
+            error_bound,
         }
+    }
+
+    /// Probability of each state of a discrete target; `None` if it was not asked about, or is continuous.
+    pub fn posterior(&self, name: &str) -> Option<Vec<f64>> {
+        let mut position = 0;
+        for target in &self.targets {
+            if let Target::Discrete { name: other, states } = target {
+                if other == name {
+                    let mut out = vec![0.0; states.len()];
+                    for term in &self.terms {
+                        out[term.states[position]] += term.log_weight.exp();
+                    }
+                    return Some(out);
+                }
+                position += 1;
+            }
+        }
+        None
+    }
+
+    /// The marginal of a continuous target; `None` if it was not asked about, or is discrete.
+    pub fn mixture(&self, name: &str) -> Option<Mixture> {
+        let mut start = 0;
+        for target in &self.targets {
+            if let Target::Continuous {
+                name: other, columns, ..
+            } = target
+            {
+                if other == name {
+                    return Some(self.dimensions(&(start..start + columns.len()).collect::<Vec<_>>()));
+                }
+                start += columns.len();
+            }
+        }
+        None
+    }
+
+    /// The joint marginal of all continuous targets, in the order asked for.
+    pub fn joint_mixture(&self) -> Mixture {
+        let n = self.terms.first().map_or(0, |term| term.mean.len());
+        self.dimensions(&(0..n).collect::<Vec<_>>())
+    }
+
+    fn dimensions(&self, dims: &[usize]) -> Mixture {
+        Mixture::new(self.terms.iter().map(|term| term.over(dims)).collect())
+    }
+
+    /// Joint values of the targets drawn from the answer: states of the discrete ones, numbers of the continuous ones, in
+    /// the order asked for. The same seed gives the same values.
+    pub fn sample(&self, n: usize, seed: u64) -> Vec<(Vec<usize>, Vec<f64>)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..n)
+            .filter_map(|_| draw(&self.terms, &mut rng).map(|(term, point)| (term.states.clone(), point)))
+            .collect()
+    }
+
+    /// The answer as the commands print it: `log_evidence`, and for one target `posterior`, or `mean`, `covariance` and
+    /// `components`; for several `targets` with each marginal, and `joint`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Answer::to_json_at`], which this is without points.
+    pub fn to_json(&self) -> Result<Value, ModelError> {
+        self.to_json_at(&[])
+    }
+
+    /// [`Answer::to_json`] with `log_density` at each point of the continuous targets' joint space (and
+    /// `log_density_sphere` where the only target is a node of unit vectors).
+    ///
+    /// # Errors
+    ///
+    /// A point of the wrong length, points without a continuous target, [`ModelError::FlatAnswer`].
+    pub fn to_json_at(&self, at: &[Vec<f64>]) -> Result<Value, ModelError> {
+        let mut out = Map::new();
+        out.insert("log_evidence".into(), json!(self.log_evidence));
+        if self.error_bound > 0.0 {
+            out.insert("error_bound".into(), json!(self.error_bound));
+        }
+        match self.targets.as_slice() {
+            [] => {}
+            [only] => self.write_marginal(only, &mut out),
+            several => {
+                let mut marginals = Map::new();
+                for target in several {
+                    let mut marginal = Map::new();
+                    self.write_marginal(target, &mut marginal);
+                    marginals.insert(target.name().into(), Value::Object(marginal));
+                }
+                out.insert("targets".into(), Value::Object(marginals));
+                out.insert("joint".into(), self.joint_json());
+            }
+        }
+        if !at.is_empty() {
+            self.write_densities(at, &mut out)?;
+        }
+        Ok(Value::Object(out))
+    }
+
+    /// [`Answer::sample`] as JSON: one object a sample, from target to state or array.
+    pub fn samples_json(&self, n: usize, seed: u64) -> Value {
+        let samples = self.sample(n, seed).into_iter().map(|(states, point)| {
+            let (mut states, mut left) = (states.into_iter(), &point[..]);
+            let pairs = self.targets.iter().map(|target| match target {
+                Target::Discrete { name, states: names } => {
+                    (name.clone(), json!(states.next().map(|state| &names[state])))
+                }
+                Target::Continuous { name, columns, .. } => {
+                    let (own, rest) = left.split_at(columns.len());
+                    left = rest;
+                    (name.clone(), json!(own))
+                }
+            });
+            Value::Object(pairs.collect())
+        });
+        Value::Array(samples.collect())
+    }
+
+    /// The modes of the continuous targets' joint density as JSON, the highest first: `[{"mode", "log_density"}]`.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::FlatAnswer`] where there is no density, or no continuous target.
+    pub fn modes_json(&self) -> Result<Value, ModelError> {
+        let mixture = self.joint_mixture();
+        let names: Vec<&str> = self.targets.iter().map(Target::name).collect();
+        let modes = (mixture.dim() > 0).then(|| mixture.modes()).flatten();
+        let modes = modes.ok_or_else(|| ModelError::FlatAnswer {
+            node: names.join(","),
+        })?;
+        let modes = modes
+            .iter()
+            .map(|(mode, log)| json!({ "mode": mode.as_slice(), "log_density": log }));
+        Ok(Value::Array(modes.collect()))
+    }
+
+    fn write_marginal(&self, target: &Target, out: &mut Map<String, Value>) {
+        match target {
+            Target::Discrete { name, states } => {
+                let probabilities = self.posterior(name).unwrap_or_default();
+                let pairs = states
+                    .iter()
+                    .cloned()
+                    .zip(probabilities.into_iter().map(Value::from));
+                out.insert("posterior".into(), Value::Object(pairs.collect()));
+            }
+            Target::Continuous { name, .. } => {
+                if let Some(mixture) = self.mixture(name) {
+                    write_mixture(&mixture, out);
+                }
+            }
+        }
+    }
+
+    fn joint_json(&self) -> Value {
+        let discrete: Vec<(&str, &[String])> = self
+            .targets
+            .iter()
+            .filter_map(|target| match target {
+                Target::Discrete { name, states } => Some((name.as_str(), states.as_slice())),
+                Target::Continuous { .. } => None,
+            })
+            .collect();
+        let terms = self.terms.iter().map(|term| {
+            let mut out = Map::new();
+            out.insert("weight".into(), json!(term.log_weight.exp()));
+            if !discrete.is_empty() {
+                let pairs = discrete.iter().zip(&term.states);
+                let states = pairs.map(|((name, states), &state)| ((*name).into(), json!(states[state])));
+                out.insert("states".into(), Value::Object(states.collect()));
+            }
+            if !term.mean.is_empty() {
+                out.insert("mean".into(), json!(term.mean.as_slice()));
+                out.insert("covariance".into(), json!(rows(&term.covariance)));
+            }
+            Value::Object(out)
+        });
+        Value::Array(terms.collect())
+    }
+
+    fn write_densities(&self, at: &[Vec<f64>], out: &mut Map<String, Value>) -> Result<(), ModelError> {
+        let mixture = self.joint_mixture();
+        let continuous: Vec<&Target> = self
+            .targets
+            .iter()
+            .filter(|target| matches!(target, Target::Continuous { .. }))
+            .collect();
+        let name = continuous
+            .iter()
+            .map(|target| target.name())
+            .collect::<Vec<_>>()
+            .join(",");
+        let d = mixture.dim();
+        for point in at {
+            if point.len() != d || d == 0 || point.iter().any(|v| !v.is_finite()) {
+                return Err(ModelError::BadValue {
+                    node: if name.is_empty() { "at".into() } else { name },
+                    found: format!("the point {point:?}"),
+                    expected: if d == 0 {
+                        "no points, as no target is continuous".into()
+                    } else {
+                        format!("{d} finite numbers")
+                    },
+                });
+            }
+        }
+        let flat = || ModelError::FlatAnswer { node: name.clone() };
+        let densities = mixture.log_densities(at).ok_or_else(flat)?;
+        if let [Target::Continuous { sphere: true, .. }] = continuous.as_slice() {
+            let normalizer = mixture.log_sphere_normalizer().ok_or_else(flat)?;
+            let on_sphere: Vec<f64> = densities
+                .iter()
+                .map(|log_density| log_density - normalizer)
+                .collect();
+            out.insert("log_density_sphere".into(), json!(on_sphere));
+        }
+        out.insert("log_density".into(), json!(densities));
         Ok(())
     }
 }
 
-/// Sums of a block with targets, by the states of its scope.
-type Sums = BTreeMap<Vec<usize>, BlockSum>;
-
-fn run(query: &Elimination) -> Result<Answer, ModelError> {
-    let tables = query.tables(false)?;
-    let mut written: BTreeSet<NodeIdx> = query.targets.iter().copied().collect();
-    written.extend(
-        query
-            .blocks
-            .iter()
-            .filter(|b| !b.targets.is_empty())
-            .flat_map(|b| b.scope.iter().copied()),
-    );
-    let written: Vec<NodeIdx> = query
-        .free()
-        .iter()
-        .copied()
-        .filter(|idx| written.contains(idx))
-        .collect();
-    let joined = LogTable::joined(
-        tables.exact.clone(),
-        &written,
-        &|idx| query.size(idx),
-        Latent::Summed,
-    )?;
-    if joined.logs.iter().any(|log| log.is_nan()) {
-        return Err(query.culprit(&tables)?);
-    }
-    let mut sums: Vec<Sums> = query.blocks.iter().map(|_| Sums::new()).collect();
-    let mut terms = Vec::new();
-    let mut dropped = f64::NEG_INFINITY;
-    let mut states = query.states.clone();
-    for (number, &log_weight) in joined.logs.iter().enumerate() {
-        if log_weight == f64::NEG_INFINITY {
-            continue;
-        }
-        let mut left = number;
-        for (idx, size) in joined.scope.iter().zip(&joined.sizes).rev() {
-            states[idx.0] = left % size;
-            left /= size;
-        }
-        let mut joint = vec![(log_weight, RootGaussian::empty(1))];
-        for (block, sums) in query.blocks.iter().zip(&mut sums) {
-            if block.targets.is_empty() {
-                continue;
-            }
-            let key: Vec<usize> = block.scope.iter().map(|idx| states[idx.0]).collect();
-            if !sums.contains_key(&key) {
-                sums.insert(key.clone(), query.block_sum(block, &states, true)?);
-            }
-            let mut pieces: Vec<(f64, &RootGaussian)> = sums[&key]
-                .pieces
-                .iter()
-                .map(|piece| (piece.log_weight, &piece.gaussian))
-                .collect();
-            shrink(&mut joint, &mut pieces, &mut dropped);
-            joint = joint
-                .iter()
-                .flat_map(|(a, left)| pieces.iter().map(move |(b, right)| (a + b, left.beside(right))))
-                .collect();
-        }
-        let target_states: Vec<usize> = query
-            .targets
-            .iter()
-            .filter(|&&idx| query.size(idx) > 0)
-            .map(|idx| states[idx.0])
-            .collect();
-        terms.extend(joint.into_iter().map(|(log_weight, gaussian)| {
-            let mean = gaussian.mean.column(0).into_owned();
-            Term::new(log_weight, target_states.clone(), mean, gaussian.root)
-        }));
-    }
-    let logs: Vec<f64> = terms.iter().map(|term| term.log_weight).collect();
-    let log_evidence = log_sum_exp(&logs);
-    if !log_evidence.is_finite() {
-        return Err(query.impossible());
-    }
-    let error_bound = error_bound(query, &tables, &sums, dropped, log_evidence)?;
-    Ok(arrange(query, terms, log_evidence, error_bound))
-}
-
-/// Leaves out the lightest pieces where their products with the others would be too many. `dropped` grows by what they
-/// weigh, all products together.
-fn shrink(joint: &mut Vec<(f64, RootGaussian)>, pieces: &mut Vec<(f64, &RootGaussian)>, dropped: &mut f64) {
-    while joint.len().saturating_mul(pieces.len()) > MAX_TERMS {
-        let total = |logs: Vec<f64>| log_sum_exp(&logs);
-        if joint.len() > pieces.len() {
-            joint.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let rest = joint.split_off(joint.len() / 2);
-            let lost =
-                total(rest.iter().map(|r| r.0).collect()) + total(pieces.iter().map(|p| p.0).collect());
-            *dropped = log_add(*dropped, lost);
-        } else {
-            pieces.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let rest = pieces.split_off(pieces.len() / 2);
-            let lost = total(rest.iter().map(|r| r.0).collect()) + total(joint.iter().map(|j| j.0).collect());
-            *dropped = log_add(*dropped, lost);
+impl Target {
+    /// Name of the node.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Discrete { name, .. } | Self::Continuous { name, .. } => name,
         }
     }
 }
 
-/// How far any probability of the answer can be off: the share of the density of the evidence that may be missing.
-fn error_bound(
-    query: &Elimination,
-    tables: &Tables,
-    sums: &[Sums],
-    dropped: f64,
-    log_evidence: f64,
-) -> Result<f64, ModelError> {
-    let some_lost = sums
-        .iter()
-        .flat_map(BTreeMap::values)
-        .any(|sum| sum.lost > f64::NEG_INFINITY);
-    if tables.upper.is_none() && !some_lost && dropped == f64::NEG_INFINITY {
-        return Ok(0.0);
-    }
-    let mut upper = tables.upper.clone().unwrap_or_else(|| tables.exact.clone());
-    for (block, sums) in query
-        .blocks
-        .iter()
-        .zip(sums)
-        .filter(|(block, _)| !block.targets.is_empty())
-    {
-        let sizes: Vec<usize> = block.scope.iter().map(|&idx| query.size(idx)).collect();
-        let mut states = query.states.clone();
-        upper.push(LogTable::fill(
-            block.scope.clone(),
-            sizes,
-            &mut states,
-            |states| {
-                let key: Vec<usize> = block.scope.iter().map(|idx| states[idx.0]).collect();
-                // A configuration that was never looked at is impossible.
-                Ok(sums
-                    .get(&key)
-                    .map_or(f64::NEG_INFINITY, |sum| log_add(sum.total, sum.lost)))
-            },
-        )?);
-    }
-    let whole = LogTable::joined(upper, &[], &|idx| query.size(idx), Latent::Summed)?;
-    let most = log_add(whole.logs[0], dropped);
-    Ok(if most.is_finite() {
-        (-(log_evidence - most).exp_m1()).clamp(0.0, 1.0)
-    } else {
-        1.0
-    })
+fn write_mixture(mixture: &Mixture, out: &mut Map<String, Value>) {
+    out.insert("mean".into(), json!(mixture.mean().as_slice()));
+    out.insert("covariance".into(), json!(rows(&mixture.covariance())));
+    let components = mixture.components().iter().map(|term| {
+        json!({
+            "weight": term.log_weight.exp(),
+            "mean": term.mean.as_slice(),
+            "covariance": rows(&term.covariance),
+        })
+    });
+    out.insert("components".into(), Value::Array(components.collect()));
 }
 
-/// Where a dimension of the answer comes from.
-enum Place {
-    Hidden(usize),
-    Observed(f64),
-}
-
-/// Normalizes, and puts the targets' dimensions into the order asked for.
-fn arrange(query: &Elimination, mut terms: Vec<Term>, log_evidence: f64, error_bound: f64) -> Answer {
-    let mut start = BTreeMap::new();
-    let mut n_hidden = 0;
-    for &idx in query.blocks.iter().flat_map(|block| &block.targets) {
-        start.insert(idx, n_hidden);
-        n_hidden += query.model.mixture(idx).map_or(0, MixtureCpd::dim);
+/// One term for each joint state.
+fn merge(terms: Vec<Term>) -> Vec<Term> {
+    let mut by_states: std::collections::BTreeMap<Vec<usize>, Vec<f64>> = std::collections::BTreeMap::new();
+    for term in terms {
+        by_states.entry(term.states).or_default().push(term.log_weight);
     }
-    let mut targets = Vec::with_capacity(query.targets.len());
-    let mut places = Vec::new();
-    for &idx in &query.targets {
-        let node = query.model.node(idx);
-        targets.push(match &node.cpd {
-            Cpd::Discrete(cpd) => Target::Discrete {
-                name: node.name.clone(),
-                states: cpd.states.clone(),
-            },
-            // Refused before: it is asked about alone.
-            Cpd::VonMisesFisher(cpd) => Target::Continuous {
-                name: node.name.clone(),
-                columns: cpd.columns.clone(),
-                sphere: true,
-            },
-            Cpd::Mixture(cpd) => {
-                places.extend((0..cpd.dim()).map(|d| match start.get(&idx) {
-                    Some(start) => Place::Hidden(start + d),
-                    None => Place::Observed(full_value(query.evidence, idx).map_or(f64::NAN, |v| v[d])),
-                }));
-                Target::Continuous {
-                    name: node.name.clone(),
-                    columns: cpd.columns.clone(),
-                    sphere: cpd.sphere,
-                }
-            }
-        });
-    }
-    let in_order = places
-        .iter()
-        .enumerate()
-        .all(|(i, place)| matches!(place, Place::Hidden(j) if *j == i));
-    for term in &mut terms {
-        term.log_weight -= log_evidence;
-        if in_order {
-            continue;
-        }
-        let mean = |place: &Place| match place {
-            Place::Hidden(i) => term.mean[*i],
-            Place::Observed(value) => *value,
-        };
-        let means: Vec<f64> = places.iter().map(mean).collect();
-        let root = DMatrix::from_fn(places.len(), term.root().ncols(), |i, j| match places[i] {
-            Place::Hidden(i) => term.root()[(i, j)],
-            Place::Observed(_) => 0.0,
-        });
-        let states = std::mem::take(&mut term.states);
-        *term = Term::new(term.log_weight, states, nalgebra::DVector::from_vec(means), root);
-    }
-    Answer::new(log_evidence, targets, terms, error_bound)
+    by_states
+        .into_iter()
+        .map(|(states, logs)| {
+            Term::new(
+                log_sum_exp(&logs),
+                states,
+                DVector::zeros(0),
+                DMatrix::zeros(0, 0),
+            )
+        })
+        .collect()
 }
