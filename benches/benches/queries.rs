@@ -79,7 +79,7 @@ fn positions(criterion: &mut Criterion) {
         criterion.bench_function(&format!("upos_given_to_2000/{name}"), |b| {
             b.iter(|| {
                 let answer = model
-                    .posterior(&["upos"], black_box(&evidence))
+                    .query(&["upos"], black_box(&evidence))
                     .expect("there is a density");
                 answer
                     .mixture("upos")

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use prehend::model::{Network, Table, TrainOptions, train};
+use prehend::model::{Network, Table, TrainOptions};
 use prehend_benches::paper_network::{network, truth, with_gaps};
 
 const ROWS: usize = 3600;
@@ -25,7 +25,7 @@ fn trainings(c: &mut Criterion) {
     let mut run = |name: &str, mixture: Option<&str>, table: &Table| {
         let network = Network::from_toml(&network(mixture)).expect("the network is legal");
         c.bench_function(name, |b| {
-            b.iter(|| one_thread.install(|| train(black_box(&network), table, &options)));
+            b.iter(|| one_thread.install(|| Model::fit(black_box(&network), table, &options)));
         });
     };
     run("train/3600 rows, components given", None, &table);

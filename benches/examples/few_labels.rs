@@ -7,7 +7,7 @@
 //! Prints log-loss, expected calibration error (ten bins of the largest probability) and accuracy of the task, on 1,000
 //! new rows of the paper's network, for sets of LABELS rows (50).
 
-use prehend::model::{BatchQuery, Model, ModelError, Network, Table, TrainOptions, train};
+use prehend::model::{BatchQuery, Model, ModelError, Network, Table, TrainOptions};
 use prehend_benches::paper_network::{network, truth};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut sums = vec![[[0.0; 3]; WAYS.len()]; 3];
     for set in 0..sets as u64 {
         let rows = truth.sample(labels, 1000 + set);
-        let model = train(&network, &rows, &TrainOptions::default())?.model;
+        let model = Model::fit(&network, &rows, &TrainOptions::default())?.model;
         let draws = model.draws(MEMBERS, 3)?;
         let resamples = (0..MEMBERS as u64)
             .map(|seed| resampled(&network, &rows, seed))
@@ -89,7 +89,7 @@ fn resampled(network: &Network, rows: &Table, seed: u64) -> Result<Model, ModelE
         weights: Some(weights),
         ..TrainOptions::default()
     };
-    Ok(train(network, rows, &options)?.model)
+    Ok(Model::fit(network, rows, &options)?.model)
 }
 
 /// The mean of the members' posteriors of the task, by row; `weighted` by the density of the evidence.

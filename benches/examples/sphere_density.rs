@@ -9,7 +9,7 @@
 use std::path::Path;
 
 use prehend::frame::Frame;
-use prehend::model::{Evidence, Network, Table, TrainOptions, train};
+use prehend::model::{Evidence, Model, Network, Table, TrainOptions};
 use prehend::training::to_table;
 
 const COLUMNS: &str = "columns = [\"upos_x\", \"upos_y\", \"upos_z\"]\nmixture = { max = 10 }\n";
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut k = 0;
         for held in [&by_row as &dyn Fn(usize) -> bool, &by_object] {
             let (test, kept): (Vec<usize>, Vec<usize>) = (0..frame.n_rows()).partition(|&row| held(row));
-            let trained = train(
+            let trained = Model::fit(
                 &network,
                 &to_table(&frame.select(&kept))?,
                 &TrainOptions::default(),
@@ -70,16 +70,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Mean log density on the sphere over the rows of a table.
-fn on_sphere(model: &prehend::model::Model, table: &Table) -> Result<f64, Box<dyn std::error::Error>> {
+fn on_sphere(model: &Model, table: &Table) -> Result<f64, Box<dyn std::error::Error>> {
     let axis = |name: &str| table.numbers(name, "upos");
     let (x, y, z) = (axis("upos_x")?, axis("upos_y")?, axis("upos_z")?);
     let at: Vec<Vec<f64>> = (0..x.len()).map(|i| vec![x[i], y[i], z[i]]).collect();
     let nothing = Evidence::new();
     let answer = if matches!(model.nodes()[0].cpd, prehend::model::Cpd::VonMisesFisher(_)) {
-        model.direction_posterior("upos", &nothing)?.to_json_at(&at)?
+        model.query_direction("upos", &nothing)?.to_json_at(&at)?
     } else {
-        model.posterior(&["upos"], &nothing)?.to_json_at(&at)?
+        model.query(&["upos"], &nothing)?.to_json_at(&at)?
     };
+    let answer: serde_json::Value = serde_json::from_str(&answer)?;
     let densities = answer["log_density_sphere"].as_array().ok_or("no densities")?;
     Ok(densities
         .iter()

@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 
 use nalgebra::{DMatrix, DVector};
 use prehend::model::{
-    Column, Component, Cpd, DiscreteCpd, MixtureCpd, Model, ModelError, Node, NodeIdx, Sign, Table, Weights,
+    Column, Component, Cpd, DiscreteCpd, Extra, MixtureCpd, Model, ModelError, Node, NodeIdx, Sign, Table,
+    Weights,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -84,14 +85,14 @@ fn model_with(components: Option<usize>) -> Result<Model, ModelError> {
         };
         nodes.push(node(name, Cpd::Mixture(mixture)));
     }
-    Model::new(nodes, serde_json::Map::new())
+    Model::new(nodes, Extra::default())
 }
 
 fn node(name: &str, cpd: Cpd) -> Node {
     Node {
         name: name.into(),
         cpd,
-        extra: serde_json::Map::new(),
+        extra: Extra::default(),
     }
 }
 

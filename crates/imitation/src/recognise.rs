@@ -76,8 +76,8 @@ pub fn recognise(demonstrator: &Model, shown: &Features) -> Result<TaskPosterior
 pub(crate) fn task_posterior(model: &Model, evidence: &Evidence) -> Result<TaskPosterior, ImitationError> {
     let tasks = model.node(model.index("task")?).states().to_vec();
     let probabilities = model
-        .posterior(&["task"], evidence)?
-        .posterior("task")
+        .query(&["task"], evidence)?
+        .probabilities("task")
         .unwrap_or_default();
     Ok(TaskPosterior { tasks, probabilities })
 }

@@ -3,7 +3,7 @@
 //! Minutes that an eruption lasted, and minutes until the next one: the data set `faithful` of R, after Azzalini and
 //! Bowman, "A look at some data on the Old Faithful geyser", Applied Statistics 39 (1990).
 
-use prehend_model::{Ensemble, Evidence, Network, Table, TrainOptions, train};
+use prehend_model::{Ensemble, Evidence, Model, Network, Table, TrainOptions};
 
 const ROWS: &str = include_str!("old_faithful.csv");
 
@@ -27,26 +27,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let table = Table::new(eruptions.len())
         .with_numbers("eruptions", eruptions)?
         .with_numbers("waiting", waiting)?;
-    let trained = train(&Network::from_toml(NETWORK)?, &table, &TrainOptions::default())?;
+    let trained = Model::fit(&Network::from_toml(NETWORK)?, &table, &TrainOptions::default())?;
     for node in &trained.report.nodes {
         println!("{}: components {:?}", node.name, node.components());
     }
     let model = trained.model;
     for minutes in [2.0, 4.5] {
         let evidence = Evidence::new().with_value(&model, "eruptions", &[minutes])?;
-        let next = model.posterior(&["waiting"], &evidence)?.joint_mixture();
+        let next = model.query(&["waiting"], &evidence)?.joint_mixture();
         let (mean, deviation) = (next.mean()[0], next.covariance()[0].sqrt());
         println!("after {minutes} minutes: wait {mean:.1} ± {deviation:.1}");
     }
     // Twenty eruptions leave more open than 272.
-    let few = train(
+    let few = Model::fit(
         &Network::from_toml(NETWORK)?,
         &table.select(&(0..20).collect::<Vec<_>>()),
         &TrainOptions::default(),
     )?;
     let ensemble = Ensemble::drawn(&few.model, 200, 1)?;
     let answer = ensemble
-        .posterior(&["waiting"], &Evidence::new())?
+        .query(&["waiting"], &Evidence::new())?
         .mean
         .joint_mixture();
     println!(

@@ -1,7 +1,6 @@
 //! The wet lawn: rain or the sprinkler? And a continuous child that tells how wet.
 
 use prehend_model::{Evidence, Latent, Model};
-use serde_json::json;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = Model::from_json(
@@ -15,16 +14,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
           [{ "weight": 1.0, "mean": [0.7], "covariance": [[0.04]] }],
           [{ "weight": 1.0, "mean": [0.9], "covariance": [[0.02]] }]] } ] }"#,
     )?;
-    let wet = Evidence::from_json(&model, &json!({ "moisture": 0.75 }))?;
-    println!("{}", model.posterior(&["rain"], &wet)?.to_json()?);
-    println!(
-        "{}",
-        model.posterior(&["rain", "sprinkler"], &wet)?.to_json()?["joint"]
-    );
+    let wet = Evidence::from_json(&model, r#"{ "moisture": 0.75 }"#)?;
+    println!("{:?}", model.query(&["rain"], &wet)?.probabilities("rain"));
+    println!("{}", model.query(&["rain", "sprinkler"], &wet)?.to_json()?);
     for sentence in model.explain("rain", &wet)?.words() {
         println!("{sentence}");
     }
-    let off = Evidence::from_json(&model, &json!({ "sprinkler": "off" }))?;
+    let off = Evidence::from_json(&model, r#"{ "sprinkler": "off" }"#)?;
     println!("{}", model.counterfactual("rain", &wet, &off)?.words()[0]);
     println!("{}", model.most_probable(&wet, Latent::Summed)?.to_json());
     Ok(())

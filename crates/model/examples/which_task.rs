@@ -1,7 +1,6 @@
 //! Which task is a grasp for? Learns from rows, then asks: one grasp at length, many at once, and one like none before.
 
-use prehend_model::{BatchQuery, Evidence, Model, Network, TrainOptions, train};
-use serde_json::json;
+use prehend_model::{BatchQuery, Evidence, Model, Network, TrainOptions};
 
 /// Where the rows come from: pourers hold wide things from the side, users narrow ones from above.
 const WORLD: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
@@ -34,14 +33,13 @@ const NETWORK: &str = r#"
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rows = Model::from_json(WORLD)?.sample(600, 1);
-    let trained = train(&Network::from_toml(NETWORK)?, &rows, &TrainOptions::default())?;
-    let model = trained.model;
-    let grasp = Evidence::from_json(&model, &json!({ "width": 0.072, "height": 0.03 }))?;
-    println!("{}", model.posterior(&["task"], &grasp)?.to_json()?);
+    let model = Model::fit(&Network::from_toml(NETWORK)?, &rows, &TrainOptions::default())?.model;
+    let grasp = Evidence::from_json(&model, r#"{ "width": 0.072, "height": 0.03 }"#)?;
+    println!("{}", model.query(&["task"], &grasp)?.to_json()?);
     println!("{}", model.explain("task", &grasp)?.words()[0]);
-    let higher = Evidence::from_json(&model, &json!({ "height": 0.12 }))?;
+    let higher = Evidence::from_json(&model, r#"{ "height": 0.12 }"#)?;
     println!("{}", model.counterfactual("task", &grasp, &higher)?.words()[0]);
-    let strange = Evidence::from_json(&model, &json!({ "width": 0.5, "height": 0.03 }))?;
+    let strange = Evidence::from_json(&model, r#"{ "width": 0.5, "height": 0.03 }"#)?;
     println!("{}", model.surprise(&strange)?.words());
     let query = BatchQuery::new(&model, "task", &["width", "height"])?;
     let answers = query

@@ -1,16 +1,18 @@
 //! One discrete target, one pattern of observed nodes, many rows: P(T | O), P(T | O, A), P(T | O, A, C).
 //!
-//! What does not depend on the row is worked out once. Given a combination of components, the observed values of a
-//! family, or of all that hangs together through hidden nodes, are Gaussian with a mean linear in the row: whitening
-//! matrices are kept for each combination, as a tree. Per row, a branch of the tree is left out when an upper bound of
-//! all it holds is below the largest term by 45 nats: less than rounding. Rows with gaps, singular components and large
-//! hidden blocks take the general path of [`Model::posterior`], with the same result.
+//! What does not depend on the row is worked out once: factors and normalizers of each combination of components, as a
+//! tree. Rows are then worked on eight at a time; a branch of the tree is left out when an upper bound of all it holds is
+//! below the largest term by 45 nats: less than rounding. Rows with gaps, singular components and large hidden blocks
+//! take the general path of [`Model::query`], with the same result.
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use crate::cpd::{Cpd, NodeIdx};
 use crate::error::ModelError;
 use crate::evidence::{Evidence, Observation};
+use crate::lanes::LANES;
 use crate::model::Model;
 use crate::plan::{Plan, Scratch};
 use crate::table::Table;
@@ -26,7 +28,7 @@ pub struct BatchQuery<'a> {
 
 /// What one row says about the target.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RowAnswer {
+pub struct RowPosterior {
     /// Natural logarithm of the density of the row's evidence.
     pub log_evidence: f64,
     /// Probability of each state of the target.
@@ -38,7 +40,7 @@ impl<'a> BatchQuery<'a> {
     ///
     /// # Errors
     ///
-    /// Unknown nodes; a continuous target, for which [`Model::posterior`] is the way.
+    /// Unknown nodes; a continuous target, for which [`Model::query`] is the way.
     pub fn new(model: &'a Model, target: &str, observed: &[&str]) -> Result<Self, ModelError> {
         let target_idx = model.index(target)?;
         if model.n_states(target_idx) == 0 {
@@ -81,11 +83,40 @@ impl<'a> BatchQuery<'a> {
     ///
     /// # Errors
     ///
-    /// Per row, as [`Model::posterior`]; a row of the wrong length.
-    pub fn run(&self, rows: &[Vec<f64>]) -> Vec<Result<RowAnswer, ModelError>> {
-        rows.par_iter()
-            .with_min_len(64)
-            .map_init(Scratch::default, |scratch, row| self.row(row, scratch))
+    /// Per row, as [`Model::query`]; a row of the wrong length.
+    pub fn run(&self, rows: &[Vec<f64>]) -> Vec<Result<RowPosterior, ModelError>> {
+        let Some(plan) = &self.fast else {
+            return rows.par_iter().map(|row| self.general(row)).collect();
+        };
+        let mut by_states: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+        let mut out: Vec<Option<Result<RowPosterior, ModelError>>> = vec![None; rows.len()];
+        for (i, row) in rows.iter().enumerate() {
+            if row.len() == self.columns.len()
+                && let Some(states) = plan.states(row)
+            {
+                by_states.entry(states).or_default().push(i);
+            }
+        }
+        let blocks: Vec<(&[usize], &[usize])> = by_states
+            .iter()
+            .flat_map(|(states, numbers)| numbers.chunks(LANES).map(|block| (&states[..], block)))
+            .collect();
+        let answers: Vec<Vec<Option<RowPosterior>>> = blocks
+            .par_iter()
+            .with_min_len(8)
+            .map_init(Scratch::default, |scratch, (states, numbers)| {
+                let block: Vec<&[f64]> = numbers.iter().map(|&i| &rows[i][..]).collect();
+                plan.rows(&block, states, scratch)
+            })
+            .collect();
+        for ((_, numbers), answers) in blocks.iter().zip(answers) {
+            for (&i, answer) in numbers.iter().zip(answers) {
+                out[i] = answer.map(Ok);
+            }
+        }
+        out.into_par_iter()
+            .zip(rows)
+            .map(|(answer, row)| answer.unwrap_or_else(|| self.general(row)))
             .collect()
     }
 
@@ -94,7 +125,7 @@ impl<'a> BatchQuery<'a> {
     /// # Errors
     ///
     /// A missing column or a cell of the wrong kind.
-    pub fn run_table(&self, table: &Table) -> Result<Vec<Result<RowAnswer, ModelError>>, ModelError> {
+    pub fn run_table(&self, table: &Table) -> Result<Vec<Result<RowPosterior, ModelError>>, ModelError> {
         let mut rows = vec![Vec::with_capacity(self.columns.len()); table.n_rows()];
         for &idx in &self.observed {
             let node = self.model.node(idx);
@@ -115,7 +146,7 @@ impl<'a> BatchQuery<'a> {
         Ok(self.run(&rows))
     }
 
-    fn row(&self, row: &[f64], scratch: &mut Scratch) -> Result<RowAnswer, ModelError> {
+    fn general(&self, row: &[f64]) -> Result<RowPosterior, ModelError> {
         if row.len() != self.columns.len() {
             return Err(ModelError::Length {
                 what: "a row of the batch".into(),
@@ -123,21 +154,6 @@ impl<'a> BatchQuery<'a> {
                 expected: self.columns.len(),
             });
         }
-        if let Some(fast) = &self.fast
-            && row.iter().all(|value| value.is_finite())
-        {
-            let mut posterior = vec![0.0; self.model.n_states(self.target)];
-            if let Some(log_evidence) = fast.row(row, scratch, &mut posterior) {
-                return Ok(RowAnswer {
-                    log_evidence,
-                    posterior,
-                });
-            }
-        }
-        self.general(row)
-    }
-
-    fn general(&self, row: &[f64]) -> Result<RowAnswer, ModelError> {
         let mut evidence = Evidence::new();
         let mut start = 0;
         for &idx in &self.observed {
@@ -161,10 +177,10 @@ impl<'a> BatchQuery<'a> {
             evidence = evidence.with(self.model, &node.name, observation)?;
         }
         let target = &self.model.node(self.target).name;
-        let answer = self.model.posterior(&[target], &evidence)?;
+        let answer = self.model.query(&[target], &evidence)?;
         answer.exact()?;
-        let posterior = answer.posterior(target).unwrap_or_default();
-        Ok(RowAnswer {
+        let posterior = answer.probabilities(target).unwrap_or_default();
+        Ok(RowPosterior {
             log_evidence: answer.log_evidence,
             posterior,
         })

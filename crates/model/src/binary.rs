@@ -15,6 +15,7 @@ use sha2::{Digest, Sha256};
 
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::ModelError;
+use crate::extra::Extra;
 use crate::model::{Model, Node};
 use crate::von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};
 
@@ -76,7 +77,7 @@ struct StoredComponent {
 impl Model {
     /// The binary form.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let text = |extra| serde_json::to_string(extra).unwrap_or_else(|_| "{}".into());
+        let text = |extra: &Extra| serde_json::to_string(extra.keys()).unwrap_or_else(|_| "{}".into());
         let stored = Stored {
             nodes: self
                 .nodes()
@@ -164,6 +165,7 @@ impl Model {
         }
         let extra = |text: &str| {
             serde_json::from_str(text)
+                .map(Extra::new)
                 .map_err(|e| bad(format!("further keys that are no JSON ({e})"), "an object"))
         };
         let nodes = stored

@@ -191,13 +191,53 @@ impl Step {
         self.alternatives.len()
     }
 
-    /// log weight, whitened observation (`None` where nothing was observed) and the Gaussian afterwards.
-    pub fn enter(
+    /// Whether all dimensions of the node were observed.
+    pub fn is_observed(&self) -> bool {
+        matches!(self.known, Known::Whole(_))
+    }
+
+    /// What is read of the row: the residual of an observed node, the mean of a hidden one, but for what hidden parents add.
+    pub fn reading(&self, i: usize) -> DMatrix<f64> {
+        match &self.known {
+            Known::Whole(value) => value - &self.alternatives[i].offset,
+            Known::Nothing | Known::Part { .. } => self.alternatives[i].offset.clone(),
+        }
+    }
+
+    /// What hidden values are multiplied with.
+    pub fn coefficients(&self, i: usize) -> &DMatrix<f64> {
+        &self.alternatives[i].coefficients
+    }
+
+    /// [`Step::enter`] with residuals in place of the observed value, whatever was read; `None` where there is no density.
+    pub fn enter_residuals(
+        &self,
+        i: usize,
+        gaussian: &RootGaussian,
+        residuals: &DMatrix<f64>,
+    ) -> Option<(f64, Option<DMatrix<f64>>, RootGaussian)> {
+        let alternative = &self.alternatives[i];
+        let (coefficients, noise) = (&alternative.coefficients, &alternative.noise);
+        if self.is_observed() {
+            let (density, after) = gaussian.condition(residuals, coefficients, noise)?;
+            Some((
+                alternative.log_weight + density.constant,
+                Some(density.white),
+                after,
+            ))
+        } else {
+            let after = gaussian.append(residuals, coefficients, noise);
+            Some((alternative.log_weight, None, after))
+        }
+    }
+
+    /// log weight with the density's logarithm, and the Gaussian afterwards.
+    fn enter(
         &self,
         model: &Model,
         i: usize,
         gaussian: &RootGaussian,
-    ) -> Result<(f64, Option<DMatrix<f64>>, RootGaussian), ModelError> {
+    ) -> Result<(f64, RootGaussian), ModelError> {
         let Alternative {
             component,
             log_weight,
@@ -211,12 +251,15 @@ impl Step {
             component: *component,
         };
         match &self.known {
-            Known::Nothing => Ok((*log_weight, None, gaussian.append(offset, coefficients, noise))),
+            Known::Nothing => Ok((*log_weight, gaussian.append(offset, coefficients, noise))),
             Known::Whole(value) => {
                 let (density, after) = gaussian
                     .condition(&(value - offset), coefficients, noise)
                     .ok_or_else(flat)?;
-                Ok((log_weight + density.constant, Some(density.white), after))
+                Ok((
+                    log_weight + density.constant - 0.5 * density.white.norm_squared(),
+                    after,
+                ))
             }
             Known::Part { dims, value, error } => {
                 let start = gaussian.dim();
@@ -228,7 +271,10 @@ impl Step {
                         after.pin(start + i, value, row);
                     }
                 }
-                Ok((log_weight + density.constant, Some(density.white), after))
+                Ok((
+                    log_weight + density.constant - 0.5 * density.white.norm_squared(),
+                    after,
+                ))
             }
         }
     }
@@ -323,11 +369,11 @@ impl Piece {
     }
 
     fn entered(&self, model: &Model, step: &Step, i: usize) -> Result<Self, ModelError> {
-        let (constant, white, gaussian) = step.enter(model, i, &self.gaussian)?;
+        let (log_term, gaussian) = step.enter(model, i, &self.gaussian)?;
         let mut components = self.components.clone();
         components.push(step.component(i));
         Ok(Self {
-            log_weight: self.log_weight + constant - 0.5 * white.map_or(0.0, |white| white.norm_squared()),
+            log_weight: self.log_weight + log_term,
             components,
             gaussian,
         })

@@ -169,7 +169,7 @@ impl MixtureCpd {
     }
 
     /// Free parameters: K [d (q + 1) + d (d + 1) / 2] for the Gaussians and K − 1 for the weights of each configuration;
-    /// what the configurations share is counted once.
+    /// what the configurations share is counted once, and so is a covariance that all components have in common.
     pub fn n_parameters(&self) -> usize {
         let gaussians = |row: &Vec<Component>| {
             let q = row.first().map_or(0, |c| c.coefficients.ncols());
@@ -185,7 +185,23 @@ impl MixtureCpd {
             Weights::Shared => (first, all),
             Weights::Root => (all, first),
         };
+        let d = self.dim();
+        let covariance = d * (d + 1) / 2;
+        let n_gaussians: usize = own_gaussians.iter().map(Vec::len).sum();
+        let counted_again = if self.has_one_covariance() {
+            n_gaussians.saturating_sub(1) * covariance
+        } else {
+            0
+        };
         own_gaussians.iter().map(gaussians).sum::<usize>() + own_weights.iter().map(free).sum::<usize>()
+            - counted_again
+    }
+
+    /// Whether all components of all configurations have the same covariance, to the bit, as training with
+    /// `covariance = "shared"` leaves them.
+    fn has_one_covariance(&self) -> bool {
+        let mut all = self.components.iter().flatten().map(|c| &c.covariance);
+        all.next().is_some_and(|first| all.all(|other| other == first))
     }
 
     /// The first place where the configurations do not share what `weights` says: configuration, component, problem.
@@ -260,6 +276,36 @@ pub(crate) fn draw(weights: impl Iterator<Item = f64> + Clone, rng: &mut impl Rn
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_shared_counts_once() {
+        let component = |weight: f64, variance: f64| Component {
+            weight,
+            mean: DVector::from_vec(vec![weight, 0.8]),
+            coefficients: DMatrix::zeros(2, 1),
+            covariance: DMatrix::identity(2, 2) * variance,
+        };
+        let mut cpd = MixtureCpd {
+            columns: vec!["a".into(), "b".into()],
+            discrete_parents: vec![NodeIdx(0)],
+            continuous_parents: vec![NodeIdx(1)],
+            components: vec![vec![component(0.4, 1.0), component(0.6, 2.0)]; 3],
+            weights: Weights::PerConfiguration,
+            sign: Sign::Fixed,
+            sphere: false,
+            scaling: None,
+        };
+        // Each of six Gaussians has 2 means, 2 slopes and 3 entries of the covariance; each of three rows one weight.
+        assert_eq!(cpd.n_parameters(), 6 * 7 + 3);
+        cpd.weights = Weights::Shared;
+        assert_eq!(cpd.n_parameters(), 2 * 7 + 3);
+        cpd.weights = Weights::Root;
+        assert_eq!(cpd.n_parameters(), 6 * 7 + 1);
+        cpd.components
+            .iter_mut()
+            .for_each(|row| row[1] = component(0.6, 1.0));
+        assert_eq!(cpd.n_parameters(), 6 * 4 + 3 + 1);
+    }
 
     #[test]
     fn a_latent_sign_makes_the_density_even() {

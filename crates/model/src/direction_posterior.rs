@@ -14,7 +14,7 @@ use crate::von_mises_fisher::{VonMisesFisher, log_mixture};
 
 /// What is known of a direction.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DirectionAnswer {
+pub struct DirectionPosterior {
     /// Natural logarithm of the density of the evidence.
     pub log_evidence: f64,
     /// The mixture; weights sum to 1.
@@ -27,7 +27,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// The node is unknown, of another kind, or observed; otherwise as [`Model::posterior`].
+    /// The node is unknown, of another kind, or observed; otherwise as [`Model::query`].
     ///
     /// # Examples
     ///
@@ -40,15 +40,11 @@ impl Model {
     ///       "components": [[{ "weight": 1.0, "direction": [0, 0, 1], "concentration": 9.0 }],
     ///                      [{ "weight": 1.0, "direction": [1, 0, 0], "concentration": 4.0 }]] }] }"#)?;
     /// let evidence = Evidence::new().with_state(&model, "task", "pour")?;
-    /// let answer = model.direction_posterior("upos", &evidence)?;
+    /// let answer = model.query_direction("upos", &evidence)?;
     /// assert!(answer.log_density(&[0.0, 0.0, 1.0])? > answer.log_density(&[1.0, 0.0, 0.0])?);
     /// # Ok::<(), prehend_model::ModelError>(())
     /// ```
-    pub fn direction_posterior(
-        &self,
-        name: &str,
-        evidence: &Evidence,
-    ) -> Result<DirectionAnswer, ModelError> {
+    pub fn query_direction(&self, name: &str, evidence: &Evidence) -> Result<DirectionPosterior, ModelError> {
         let idx = self.index(name)?;
         let refuse = |found: &str, expected: &str| ModelError::BadValue {
             node: name.into(),
@@ -69,7 +65,7 @@ impl Model {
             .iter()
             .map(|&parent| self.node(parent).name.as_str())
             .collect();
-        let answer = self.posterior(&parents, evidence)?;
+        let answer = self.query(&parents, evidence)?;
         let mut states = vec![0; self.nodes().len()];
         let mut components = Vec::new();
         for term in &answer.terms {
@@ -86,7 +82,7 @@ impl Model {
                     }),
             );
         }
-        Ok(DirectionAnswer {
+        Ok(DirectionPosterior {
             log_evidence: answer.log_evidence,
             components,
             name: name.into(),
@@ -94,7 +90,7 @@ impl Model {
     }
 }
 
-impl DirectionAnswer {
+impl DirectionPosterior {
     /// log density on the sphere at a unit vector.
     ///
     /// # Errors
@@ -131,8 +127,8 @@ impl DirectionAnswer {
     ///
     /// # Errors
     ///
-    /// As [`DirectionAnswer::log_density`].
-    pub fn to_json_at(&self, at: &[Vec<f64>]) -> Result<Value, ModelError> {
+    /// As [`DirectionPosterior::log_density`].
+    pub fn to_json_at(&self, at: &[Vec<f64>]) -> Result<String, ModelError> {
         let components: Vec<Value> = self
             .components
             .iter()
@@ -150,6 +146,6 @@ impl DirectionAnswer {
                 .collect::<Result<_, _>>()?;
             out["log_density_sphere"] = json!(densities);
         }
-        Ok(out)
+        Ok(out.to_string())
     }
 }

@@ -54,7 +54,7 @@ impl Model {
                     };
                     draw_node(&network, i, kept, &cells[i], &units, &mut node.cpd, &mut rng);
                 }
-                Self::new(nodes, serde_json::Map::new())
+                Self::new(nodes, crate::extra::Extra::default())
             })
             .collect()
     }

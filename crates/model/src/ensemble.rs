@@ -1,11 +1,11 @@
 //! What do all models say that the training rows allow?
 
-use crate::answer::Answer;
 use crate::error::ModelError;
 use crate::evidence::Evidence;
 use crate::gaussian::log_sum_exp;
 use crate::mixture::Term;
 use crate::model::Model;
+use crate::posterior::Posterior;
 
 /// Models of one structure with equal standing: draws of parameters that the training rows allow ([`Model::draws`]).
 ///
@@ -18,11 +18,11 @@ pub struct Ensemble {
 
 /// What the members of an [`Ensemble`] say.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EnsembleAnswer {
+pub struct EnsemblePosterior {
     /// The mean of the members' answers. Its `log_evidence` is the logarithm of the mean density of the evidence.
-    pub mean: Answer,
+    pub mean: Posterior,
     /// Each member's answer.
-    pub members: Vec<Answer>,
+    pub members: Vec<Posterior>,
 }
 
 impl Ensemble {
@@ -67,13 +67,13 @@ impl Ensemble {
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`].
-    pub fn posterior(&self, targets: &[&str], evidence: &Evidence) -> Result<EnsembleAnswer, ModelError> {
+    /// As [`Model::query`].
+    pub fn query(&self, targets: &[&str], evidence: &Evidence) -> Result<EnsemblePosterior, ModelError> {
         let members = self
             .members
             .iter()
-            .map(|model| model.posterior(targets, evidence))
-            .collect::<Result<Vec<Answer>, _>>()?;
+            .map(|model| model.query(targets, evidence))
+            .collect::<Result<Vec<Posterior>, _>>()?;
         let share = (members.len() as f64).ln();
         let terms = members
             .iter()
@@ -91,19 +91,19 @@ impl Ensemble {
         let targets = members
             .first()
             .map_or_else(Vec::new, |answer| answer.targets.clone());
-        let mean = Answer::new(log_sum_exp(&logs) - share, targets, terms.collect(), bound);
-        Ok(EnsembleAnswer { mean, members })
+        let mean = Posterior::new(log_sum_exp(&logs) - share, targets, terms.collect(), bound);
+        Ok(EnsemblePosterior { mean, members })
     }
 }
 
-impl EnsembleAnswer {
+impl EnsemblePosterior {
     /// Per state of a discrete target the probabilities between which the middle `level` of the members lie, for example
     /// 0.9; `None` if it was not asked about, or is continuous.
     pub fn interval(&self, name: &str, level: f64) -> Option<Vec<(f64, f64)>> {
         let members: Vec<Vec<f64>> = self
             .members
             .iter()
-            .map(|answer| answer.posterior(name))
+            .map(|answer| answer.probabilities(name))
             .collect::<Option<_>>()?;
         let n = members.len();
         let tail = 0.5 * (1.0 - level.clamp(0.0, 1.0));

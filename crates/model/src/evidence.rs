@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::cpd::{Cpd, NodeIdx};
 use crate::error::{ModelError, list};
+use crate::extra::parse;
 use crate::gaussian::cholesky;
 use crate::model::Model;
 use crate::table::{Table, state_at};
@@ -103,9 +104,10 @@ impl Evidence {
     ///
     /// # Errors
     ///
-    /// Unknown nodes and states, wrong lengths, and what is no observation, each with the node's name.
-    pub fn from_json(model: &Model, json: &Value) -> Result<Self, ModelError> {
-        let Value::Object(entries) = json else {
+    /// Text that is no JSON; unknown nodes and states, wrong lengths, and what is no observation, each with the node's name.
+    pub fn from_json(model: &Model, json: &str) -> Result<Self, ModelError> {
+        let json = parse("evidence", json)?;
+        let Value::Object(entries) = &json else {
             return Err(ModelError::BadValue {
                 node: "evidence".into(),
                 found: json.to_string(),

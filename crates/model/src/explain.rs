@@ -58,7 +58,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`]; a continuous target.
+    /// As [`Model::query`]; a continuous target.
     pub fn explain(&self, target: &str, evidence: &Evidence) -> Result<Explanation, ModelError> {
         let idx = self.index(target)?;
         let Cpd::Discrete(cpd) = &self.node(idx).cpd else {
@@ -69,7 +69,7 @@ impl Model {
             });
         };
         let log_posterior = |evidence: &Evidence| -> Result<Vec<f64>, ModelError> {
-            let answer = self.posterior(&[target], evidence)?;
+            let answer = self.query(&[target], evidence)?;
             answer.exact()?;
             let mut out = vec![f64::NEG_INFINITY; cpd.states.len()];
             for term in &answer.terms {
@@ -118,7 +118,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`]; a continuous target.
+    /// As [`Model::query`]; a continuous target.
     pub fn counterfactual(
         &self,
         target: &str,
@@ -133,9 +133,9 @@ impl Model {
             changed.push((name.clone(), observation.in_words(self.node(idx).states())));
         }
         let posterior = |evidence: &Evidence| -> Result<Vec<f64>, ModelError> {
-            let answer = self.posterior(&[target], evidence)?;
+            let answer = self.query(&[target], evidence)?;
             answer.exact()?;
-            answer.posterior(target).ok_or_else(|| ModelError::BadValue {
+            answer.probabilities(target).ok_or_else(|| ModelError::BadValue {
                 node: target.into(),
                 found: "a continuous target to explain".into(),
                 expected: "a discrete node".into(),
@@ -157,7 +157,7 @@ impl Model {
 
 impl Explanation {
     /// `{"target", "state", "against": {OTHER: {"prior", "contributions": {NODE: nats}, "total"}}}`.
-    pub fn to_json(&self) -> Value {
+    pub fn to_json(&self) -> String {
         let mut against = Map::new();
         for contrast in &self.against {
             let parts: Map<String, Value> = contrast
@@ -169,6 +169,7 @@ impl Explanation {
             against.insert(contrast.other.clone(), entry);
         }
         json!({ "target": self.target, "state": self.state, "against": against, "words": self.words() })
+            .to_string()
     }
 
     /// One sentence for each other state: how many times more probable the likeliest state is, and which observations
@@ -245,7 +246,7 @@ impl Counterfactual {
     }
 
     /// `{"target", "changes": {NODE: value in words}, "posterior": {STATE: {"now", "then"}}, "words"}`.
-    pub fn to_json(&self) -> Value {
+    pub fn to_json(&self) -> String {
         let changes: Map<String, Value> = self
             .changes
             .iter()
@@ -257,5 +258,6 @@ impl Counterfactual {
             .map(|(state, before, after)| (state.clone(), json!({ "now": before, "then": after })))
             .collect();
         json!({ "target": self.target, "changes": changes, "posterior": states, "words": self.words() })
+            .to_string()
     }
 }

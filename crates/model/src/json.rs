@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
 use crate::error::{ModelError, list};
+use crate::extra::Extra;
 use crate::model::{Model, Node};
 use crate::von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};
 
@@ -123,7 +124,7 @@ impl Model {
             .into_iter()
             .map(|(name, node)| read_node(name, node, &names))
             .collect::<Result<_, _>>()?;
-        Self::new(nodes, top)
+        Self::new(nodes, Extra::new(top))
     }
 
     /// The model as JSON text: keys in a fixed order, numbers in the shortest form that reads back to the same bits.
@@ -133,7 +134,7 @@ impl Model {
         top.put("version", &VERSION.to_string());
         let nodes: Vec<String> = self.nodes().iter().map(|node| write_node(self, node)).collect();
         top.put("nodes", &format!("[\n{}\n]", nodes.join(",\n")));
-        top.extras(self.extra());
+        top.extras(self.extra().keys());
         format!("{{{}\n}}\n", top.lines("\n  "))
     }
 }
@@ -231,7 +232,11 @@ fn read_node(name: String, mut node: Map<String, Value>, names: &[String]) -> Re
             return Err(at(problem));
         }
     };
-    Ok(Node { name, cpd, extra })
+    Ok(Node {
+        name,
+        cpd,
+        extra: Extra::new(extra),
+    })
 }
 
 impl RawDirection {
@@ -391,6 +396,6 @@ fn write_node(model: &Model, node: &Node) -> String {
             );
         }
     }
-    out.extras(&node.extra);
+    out.extras(node.extra.keys());
     format!("    {{{}\n    }}", out.lines("\n      "))
 }

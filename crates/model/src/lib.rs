@@ -1,12 +1,36 @@
 //! What follows from evidence in a mixed Bayesian network?
 //!
-//! A [`Network`] says which nodes there are, which arcs, and how each node is to be trained: `network.toml`. A [`Table`]
-//! holds rows. [`train`] makes a [`Model`] of both; a person may also write one by hand: `model.json`. A model answers
-//! [`Model::posterior`] for any nodes, given any [`Evidence`] about others, exactly.
+//! A network has discrete nodes with tables, and continuous ones, each a vector of numbers: given its parents such a node
+//! is a mixture of Gaussian linear regressions on the continuous parents, one mixture for each configuration of the
+//! discrete ones. Nodes are just names: nothing in this crate knows what they mean. It opens no files: texts and bytes
+//! come in, texts and bytes go out.
 //!
-//! Discrete nodes have tables. A continuous node is a vector; for each configuration of its discrete parents it has a
-//! mixture of Gaussian linear regressions on its continuous parents. Nodes are just names here: nothing in this crate
-//! knows what a grasp is. It opens no files: texts and bytes come in, texts and bytes go out.
+//! **A model** comes from a text that a person wrote, or from rows:
+//!
+//! ```
+//! use prehend_model::{Column, Model, Network, Table, TrainOptions};
+//!
+//! let network = Network::from_toml(r#"
+//!     [[node]]
+//!     name = "task"
+//!     kind = "discrete"
+//!     states = ["pour", "use"]
+//!
+//!     [[node]]
+//!     name = "width"
+//!     kind = "gaussian_mixture"
+//!     parents = ["task"]
+//!     mixture = { components = 1 }"#)?;
+//! let rows = Table::new(8)
+//!     .with("task", Column::Texts(["pour", "pour", "pour", "pour", "use", "use", "use", "use"].map(String::from).to_vec()))?
+//!     .with_numbers("width", vec![0.08, 0.07, 0.09, 0.08, 0.03, 0.02, 0.03, 0.04])?;
+//! let model = Model::fit(&network, &rows, &TrainOptions::default())?.model;
+//! # assert_eq!(model.nodes().len(), 2);
+//! # Ok::<(), prehend_model::ModelError>(())
+//! ```
+//!
+//! **A question** names targets, and what is known of other nodes: all of a node, some of its dimensions, a measurement
+//! with its error, or how likely each state is. The answer is exact, or says how far off it can be at most.
 //!
 //! ```
 //! use prehend_model::{Evidence, Model};
@@ -16,13 +40,24 @@
 //!     { "name": "width", "kind": "gaussian_mixture", "discrete_parents": ["task"], "components": [
 //!         [{ "weight": 1.0, "mean": [0.08], "covariance": [[1e-4]] }],
 //!         [{ "weight": 1.0, "mean": [0.03], "covariance": [[1e-4]] }]] }] }"#)?;
-//! let evidence = Evidence::new().with_value(&model, "width", &[0.07])?;
-//! let answer = model.posterior(&["task"], &evidence)?;
-//! assert!(answer.posterior("task").unwrap()[0] > 0.99);
+//! let seen = Evidence::new().with_value(&model, "width", &[0.07])?;
+//! let task = model.query(&["task"], &seen)?;
+//! assert!(task.probabilities("task").unwrap()[0] > 0.99);
+//!
+//! // The other way round the answer is a mixture: density, moments, modes and samples.
+//! let pouring = Evidence::new().with_state(&model, "task", "pour")?;
+//! let width = model.query(&["width"], &pouring)?.mixture("width").unwrap();
+//! assert!((width.mean()[0] - 0.08).abs() < 1e-12);
+//!
+//! // Why, and is it like anything known?
+//! println!("{}", model.explain("task", &seen)?.words()[0]);
+//! println!("{}", model.surprise(&seen)?.words());
 //! # Ok::<(), prehend_model::ModelError>(())
 //! ```
 //!
-//! `docs/model-format.md` describes both files, the evidence and the answers.
+//! The same question about many rows is compiled once: [`BatchQuery`]. Which arcs there are can be learned too:
+//! [`learn_structure`]. Examples that run: `sprinkler`, `old_faithful`, `which_task`. `docs/model-format.md` describes the
+//! files, the evidence and the answers; `docs/model.md` says what was measured.
 
 mod error;
 
@@ -32,6 +67,7 @@ mod table;
 
 mod binary;
 mod cpd;
+mod extra;
 mod interchange;
 mod json;
 mod model;
@@ -59,12 +95,12 @@ mod train;
 
 mod structure;
 
-mod answer;
 mod draws;
 mod ensemble;
 mod evidence;
 mod mixture;
 mod posterior;
+mod query;
 
 mod block;
 mod elimination;
@@ -72,11 +108,12 @@ mod log_table;
 
 mod batch;
 mod explain;
+mod lanes;
 mod most_probable;
 mod plan;
-mod reader;
 mod surprise;
 mod tree;
+mod tree_sum;
 
 mod double_double;
 mod gaussian;
@@ -84,32 +121,33 @@ mod root_gaussian;
 mod sphere;
 
 mod bessel;
-mod direction_answer;
+mod direction_posterior;
 mod von_mises_fisher;
 mod von_mises_fisher_fit;
 mod von_mises_fisher_train;
 
-pub use answer::{Answer, Target};
-pub use batch::{BatchQuery, RowAnswer};
+pub use batch::{BatchQuery, RowPosterior};
 pub use block::Latent;
 pub use cell::{CellReport, OrderScore};
 pub use cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Scaling, Sign, Weights};
-pub use direction_answer::DirectionAnswer;
-pub use ensemble::{Ensemble, EnsembleAnswer};
+pub use direction_posterior::DirectionPosterior;
+pub use ensemble::{Ensemble, EnsemblePosterior};
 pub use error::ModelError;
 pub use evidence::{Evidence, Observation};
 pub use explain::{Contrast, Counterfactual, Explanation};
+pub use extra::Extra;
 pub use gaps::GapReport;
 pub use interchange::Export;
 pub use mixture::{Mixture, Term};
 pub use model::{Model, Node};
 pub use most_probable::{MostProbable, ProbableValue};
 pub use network::{MixtureOrder, MixtureSpec, Network, NodeKind, NodeSpec, VonMisesFisherSpec};
+pub use posterior::{Posterior, Target};
 pub use structure::{
     LearnedArc, LearnedStructure, StructureOptions, StructureRules, StructureScore, learn_structure,
     score_structure,
 };
 pub use surprise::Surprise;
 pub use table::{Column, Table};
-pub use train::{NodeReport, TrainOptions, TrainReport, Trained, train};
+pub use train::{NodeReport, TrainOptions, TrainReport, Trained};
 pub use von_mises_fisher::{VonMisesFisher, VonMisesFisherCpd};

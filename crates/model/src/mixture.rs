@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::gaussian::{LOG_TAU, log_sum_exp, solve_lower, solve_lower_transpose};
+use crate::lanes::{LANES, Lanes, LogSums, norm_of_product};
 use crate::root_gaussian::{covariance_of, triangular_root};
 use crate::sphere::log_sphere_normalizer;
 
@@ -15,8 +16,6 @@ const MODE_STARTS: usize = 256;
 const MODE_STEPS: usize = 500;
 /// Two modes closer than this many standard deviations are one.
 const SAME_MODE: f64 = 1e-4;
-/// exp(−45) = 3e-20: what is smaller than the largest term by that is lost in its last digit.
-const NEGLIGIBLE: f64 = 45.0;
 
 /// One weighted piece of an answer: states of the discrete targets, a Gaussian over the continuous ones.
 #[derive(Debug, Clone, PartialEq)]
@@ -153,23 +152,40 @@ impl Mixture {
     /// [`Mixture::log_density`] at many points; `None` where a component is singular.
     pub fn log_densities<P: AsRef<[f64]>>(&self, points: &[P]) -> Option<Vec<f64>> {
         let factors: Vec<&Factor> = self.factors.iter().map(Option::as_ref).collect::<Option<_>>()?;
-        let mut away = vec![0.0; self.dim()];
-        let mut terms = vec![0.0; factors.len()];
         let mut out = Vec::with_capacity(points.len());
-        for point in points {
-            let mut largest = f64::NEG_INFINITY;
-            for ((slot, factor), term) in terms.iter_mut().zip(&factors).zip(&self.components) {
-                *slot = factor.log_term(point.as_ref(), term.mean.as_slice(), &mut away);
-                largest = largest.max(*slot);
-            }
-            let sum: f64 = terms
-                .iter()
-                .filter(|t| **t > largest - NEGLIGIBLE)
-                .map(|t| (t - largest).exp())
-                .sum();
-            out.push(largest + sum.ln());
+        for block in points.chunks(LANES) {
+            let point = |lane: usize| block[lane.min(block.len() - 1)].as_ref();
+            let x: Vec<Lanes> = (0..self.dim())
+                .map(|i| std::array::from_fn(|lane| point(lane)[i]))
+                .collect();
+            // The compiler unrolls what it knows the size of.
+            let sums = match self.dim() {
+                1 => self.log_sums(1, &factors, &x),
+                2 => self.log_sums(2, &factors, &x),
+                3 => self.log_sums(3, &factors, &x),
+                4 => self.log_sums(4, &factors, &x),
+                d => self.log_sums(d, &factors, &x),
+            };
+            out.extend_from_slice(&sums[..block.len()]);
         }
         Some(out)
+    }
+
+    /// Log densities at several points, coordinate by coordinate.
+    #[inline(always)]
+    fn log_sums(&self, d: usize, factors: &[&Factor], x: &[Lanes]) -> Lanes {
+        let mut sums = LogSums::default();
+        let mut away = vec![[0.0; LANES]; d];
+        for (factor, term) in factors.iter().zip(&self.components) {
+            for ((away, x), mean) in away.iter_mut().zip(x).zip(term.mean.iter()) {
+                for lane in 0..LANES {
+                    away[lane] = x[lane] - mean;
+                }
+            }
+            let square = norm_of_product(&factor.white, &away[..d]);
+            sums.add(&square.map(|square| factor.constant - 0.5 * square));
+        }
+        sums.values()
     }
 
     /// log ∫ density over the unit sphere; `None` where a component is singular. `log_density` minus this is the

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
-use serde_json::{Map, Value};
 
 use crate::cpd::{Cpd, MixtureCpd, NodeIdx};
 use crate::double_double::{Root, covariance_root};
 use crate::error::{ModelError, list};
+use crate::extra::Extra;
 use crate::von_mises_fisher::{MAX_CONCENTRATION, VonMisesFisherCpd};
 
 /// Rows of tables and of mixture weights sum to 1 within this: what six printed digits of each entry allow.
@@ -26,14 +26,14 @@ pub struct Node {
     /// Distribution given the parents.
     pub cpd: Cpd,
     /// Further keys of the file, kept as they are.
-    pub extra: Map<String, Value>,
+    pub extra: Extra,
 }
 
 /// A mixed Bayesian network (Eq. 1): P(x) = Π P(xᵢ | parents of xᵢ), checked as a whole.
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) nodes: Vec<Node>,
-    extra: Map<String, Value>,
+    extra: Extra,
     order: Vec<NodeIdx>,
     names: BTreeMap<String, NodeIdx>,
     /// Per node, configuration and component: the root of the covariance.
@@ -53,7 +53,7 @@ impl Model {
     ///
     /// Duplicate names or columns, cycles, a continuous parent of a discrete node, tables and components of the wrong
     /// shape, rows that do not sum to 1, covariances that are not symmetric or have a negative eigenvalue.
-    pub fn new(nodes: Vec<Node>, extra: Map<String, Value>) -> Result<Self, ModelError> {
+    pub fn new(nodes: Vec<Node>, extra: Extra) -> Result<Self, ModelError> {
         let mut names = BTreeMap::new();
         for (i, node) in nodes.iter().enumerate() {
             if names.insert(node.name.clone(), NodeIdx(i)).is_some() {
@@ -101,15 +101,18 @@ impl Model {
     }
 
     /// Keys that stand beside `nodes` in the file, for example `provenance`.
-    pub fn extra(&self) -> &Map<String, Value> {
+    pub fn extra(&self) -> &Extra {
         &self.extra
     }
 
-    /// The same model with one more key beside `nodes`.
-    #[must_use]
-    pub fn with_extra(mut self, key: &str, value: Value) -> Self {
-        self.extra.insert(key.into(), value);
-        self
+    /// The same model with one more key beside `nodes`, its value as JSON text.
+    ///
+    /// # Errors
+    ///
+    /// As [`Extra::with`].
+    pub fn with_extra(mut self, key: &str, json: &str) -> Result<Self, ModelError> {
+        self.extra = self.extra.with(key, json)?;
+        Ok(self)
     }
 
     /// The node of this name.

@@ -47,7 +47,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`]; [`ModelError::Pruned`] where combinations of components are too many to be sure.
+    /// As [`Model::query`]; [`ModelError::Pruned`] where combinations of components are too many to be sure.
     pub fn most_probable(&self, evidence: &Evidence, latent: Latent) -> Result<MostProbable, ModelError> {
         let all = (0..self.nodes().len()).map(NodeIdx);
         let is_open = |idx: &NodeIdx| match (&self.node(*idx).cpd, evidence.get(*idx)) {
@@ -93,7 +93,7 @@ impl Model {
 
     fn value_by_itself(&self, idx: NodeIdx, given: &Evidence) -> Result<Option<ProbableValue>, ModelError> {
         let node = self.node(idx).name.clone();
-        let answer = self.posterior(&[&node], given)?;
+        let answer = self.query(&[&node], given)?;
         answer.exact()?;
         Ok(answer.mixture(&node).map(|mixture| ProbableValue {
             mean: mixture.mean().iter().copied().collect(),
@@ -196,7 +196,7 @@ fn likeliest_states(query: &Elimination) -> Result<(f64, Vec<usize>), ModelError
 
 impl MostProbable {
     /// `{"log_probability", "log_evidence", "states": {NODE: state}, "components": {NODE: k}, "values": {NODE: {"mean", "mode", "covariance"}}}`.
-    pub fn to_json(&self) -> Value {
+    pub fn to_json(&self) -> String {
         let states: Map<String, Value> = self
             .states
             .iter()
@@ -222,5 +222,6 @@ impl MostProbable {
             "components": components,
             "values": values,
         })
+        .to_string()
     }
 }

@@ -398,7 +398,11 @@ impl RawNode {
         let foreign = [
             ("states", self.states.is_some()),
             ("prior", self.prior.is_some()),
-            ("weights", self.weights.is_some()),
+            (
+                "weights",
+                self.weights.is_some() || self.mixture.as_ref().is_some_and(|m| m.weights.is_some()),
+            ),
+            ("covariance", self.covariance.is_some()),
             ("sign", self.sign.is_some()),
             ("sphere", self.sphere.is_some()),
         ];
@@ -505,6 +509,22 @@ mod tests {
         assert!(problem(&twice).starts_with("the column `a` is used by `a` and by `b`"));
         let zero = node("a", "\"gaussian_mixture\"\nmixture = { components = 0 }");
         assert!(problem(&zero).contains("`mixture` is neither of its two forms"));
+        let direction = |rest: &str| {
+            node(
+                "a",
+                &format!("\"von_mises_fisher_mixture\"\ncolumns = [\"x\", \"y\"]\n{rest}"),
+            )
+        };
+        for key in [
+            "covariance = \"shared\"",
+            "weights = \"root\"",
+            "mixture = { max = 3, weights = \"root\" }",
+        ] {
+            assert!(
+                problem(&direction(key)).contains("no such key in a von_mises_fisher_mixture"),
+                "{key}"
+            );
+        }
         assert!(
             problem("[[node]]\nname = \"a\"\nkind = \"gaussian_mixture\"\ncolour = 3\n").contains("colour")
         );

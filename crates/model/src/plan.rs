@@ -5,11 +5,15 @@ use std::collections::btree_map::Entry;
 
 use nalgebra::DMatrix;
 
+use crate::batch::RowPosterior;
 use crate::block::{self, Known};
 use crate::cpd::{Cpd, NodeIdx};
+use crate::evidence::unit_vector;
+use crate::lanes::{LANES, Lanes, LogSums};
 use crate::model::Model;
-use crate::reader::LogSum;
+use crate::table::state_at;
 use crate::tree::Tree;
+use crate::tree_sum::Open;
 
 /// Most joint states of the discrete nodes.
 const MAX_ASSIGNMENTS: usize = 4096;
@@ -21,8 +25,10 @@ pub(crate) struct Plan {
     assignments: Vec<Assignment>,
     /// Observed families and hidden blocks per configuration; shared by assignments.
     factors: Vec<Tree>,
-    /// Place in the row of each observed discrete node.
-    observed_states: Vec<usize>,
+    /// Place in the row of each observed discrete node, and its number of states.
+    observed_states: Vec<(usize, usize)>,
+    /// Place in the row of each observed direction, and its dimension.
+    directions: Vec<(usize, usize)>,
 }
 
 struct Assignment {
@@ -36,11 +42,11 @@ struct Assignment {
 /// Buffers of one thread.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    factors: Vec<f64>,
-    open: Vec<(f64, f64, usize)>,
-    by_state: Vec<LogSum>,
-    /// The row and 1.
-    x: Vec<f64>,
+    factors: Vec<Option<Lanes>>,
+    open: Open,
+    by_state: Vec<LogSums>,
+    /// The rows and 1, column by column.
+    x: Vec<Lanes>,
 }
 
 impl Plan {
@@ -92,7 +98,15 @@ impl Plan {
             n_target_states: model.n_states(target),
             assignments: Vec::with_capacity(n),
             factors: Vec::new(),
-            observed_states: discrete.iter().filter_map(|idx| place[idx.0]).collect(),
+            observed_states: discrete
+                .iter()
+                .filter_map(|&idx| place[idx.0].map(|start| (start, model.n_states(idx))))
+                .collect(),
+            directions: continuous
+                .iter()
+                .filter(|&&idx| matches!(model.node(idx).cpd, Cpd::VonMisesFisher(_)))
+                .filter_map(|&idx| place[idx.0].map(|start| (start, model.node(idx).columns().len())))
+                .collect(),
         };
         let mut known_factors = BTreeMap::new();
         let mut states = vec![0; model.nodes().len()];
@@ -118,8 +132,17 @@ impl Plan {
                 let number = match known_factors.entry(key) {
                     Entry::Occupied(known) => *known.get(),
                     Entry::Vacant(vacant) => {
-                        let (steps, _) = block::steps(model, nodes, &states, width + 1, &known);
-                        fast.factors.push(Tree::grow(model, &steps, width + 1)?);
+                        fast.factors
+                            .push(match (&model.node(nodes[0]).cpd, place[nodes[0].0]) {
+                                (Cpd::VonMisesFisher(cpd), Some(start)) => {
+                                    let configuration = model.configuration(nodes[0], &states);
+                                    Tree::of_directions(&cpd.components[configuration], start, width)
+                                }
+                                _ => {
+                                    let (steps, _) = block::steps(model, nodes, &states, width + 1, &known);
+                                    Tree::grow(&steps)?
+                                }
+                            });
                         *vacant.insert(fast.factors.len() - 1)
                     }
                 };
@@ -139,46 +162,79 @@ impl Plan {
         Some(fast)
     }
 
-    /// Writes the target's posterior and gives the log density of the row; `None` where no term is finite: the general
-    /// path says why.
-    pub fn row(&self, row: &[f64], scratch: &mut Scratch, posterior: &mut [f64]) -> Option<f64> {
+    /// The states of the observed discrete nodes; `None` for a row that has gaps or no legal values: the general path says
+    /// which.
+    pub fn states(&self, row: &[f64]) -> Option<Vec<usize>> {
+        let legal = row.iter().all(|value| value.is_finite())
+            && self
+                .directions
+                .iter()
+                .all(|&(start, d)| unit_vector("", &row[start..start + d]).is_ok());
+        let states = self.observed_states.iter();
+        legal.then(|| states.map(|&(place, n)| state_at(row[place], n)).collect())?
+    }
+
+    /// What up to [`LANES`] rows say, all with the same states of the observed discrete nodes; `None` for a row where no
+    /// term is finite: the general path says why.
+    pub fn rows(
+        &self,
+        rows: &[&[f64]],
+        states: &[usize],
+        scratch: &mut Scratch,
+    ) -> Vec<Option<RowPosterior>> {
         let Scratch {
             factors,
             open,
             by_state,
             x,
         } = scratch;
+        let width = rows.first().map_or(0, |row| row.len());
         x.clear();
-        x.extend_from_slice(row);
-        x.push(1.0);
-        factors.clear();
-        factors.resize(self.factors.len(), f64::NAN);
-        by_state.clear();
-        by_state.resize_with(self.n_target_states, LogSum::default);
-        for assignment in &self.assignments {
-            let mut fits = assignment.observed.iter().zip(&self.observed_states);
-            if fits.any(|(&state, &place)| row[place] != state as f64) {
-                continue;
-            }
-            let mut log_weight = assignment.log_prior;
-            for &i in &assignment.factors {
-                if factors[i].is_nan() {
-                    factors[i] = self.factors[i].log_integral(x, open);
+        x.extend((0..width).map(|j| std::array::from_fn(|lane| rows[lane.min(rows.len() - 1)][j])));
+        x.push([1.0; LANES]);
+        for &(start, d) in &self.directions {
+            for lane in 0..LANES {
+                let length = x[start..start + d]
+                    .iter()
+                    .map(|v| v[lane] * v[lane])
+                    .sum::<f64>()
+                    .sqrt();
+                for v in &mut x[start..start + d] {
+                    v[lane] /= length;
                 }
-                log_weight += factors[i];
             }
-            by_state[assignment.target_state].add(log_weight);
         }
-        let mut all = LogSum::default();
-        for (slot, sum) in posterior.iter_mut().zip(by_state.iter()) {
-            *slot = sum.value();
-            all.add(*slot);
+        factors.clear();
+        factors.resize(self.factors.len(), None);
+        by_state.clear();
+        by_state.resize_with(self.n_target_states, LogSums::default);
+        for assignment in self.assignments.iter().filter(|a| a.observed == states) {
+            let mut log_weight = [assignment.log_prior; LANES];
+            for &i in &assignment.factors {
+                let factor = factors[i].get_or_insert_with(|| self.factors[i].log_sums(x, open));
+                for lane in 0..LANES {
+                    log_weight[lane] += factor[lane];
+                }
+            }
+            by_state[assignment.target_state].add(&log_weight);
         }
-        let log_evidence = all.value();
-        for slot in posterior {
-            *slot = (*slot - log_evidence).exp();
+        let by_state: Vec<Lanes> = by_state.iter().map(LogSums::values).collect();
+        let mut all = LogSums::default();
+        for state in &by_state {
+            all.add(state);
         }
-        log_evidence.is_finite().then_some(log_evidence)
+        let log_evidence = all.values();
+        (0..rows.len())
+            .map(|lane| {
+                let posterior = by_state
+                    .iter()
+                    .map(|state| (state[lane] - log_evidence[lane]).exp());
+                log_evidence[lane].is_finite().then(|| RowPosterior {
+                    log_evidence: log_evidence[lane],
+                    posterior: posterior.collect(),
+                })
+            })
+            .collect()
     }
 }
 

@@ -33,7 +33,7 @@ pub enum Target {
 
 /// The posterior of the targets, jointly and exactly.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answer {
+pub struct Posterior {
     /// Natural logarithm of the density of the evidence.
     pub log_evidence: f64,
     /// What was asked about.
@@ -46,7 +46,7 @@ pub struct Answer {
     pub error_bound: f64,
 }
 
-impl Answer {
+impl Posterior {
     pub(crate) fn new(log_evidence: f64, targets: Vec<Target>, terms: Vec<Term>, error_bound: f64) -> Self {
         let continuous = targets
             .iter()
@@ -61,7 +61,7 @@ impl Answer {
     }
 
     /// Probability of each state of a discrete target; `None` if it was not asked about, or is continuous.
-    pub fn posterior(&self, name: &str) -> Option<Vec<f64>> {
+    pub fn probabilities(&self, name: &str) -> Option<Vec<f64>> {
         let mut position = 0;
         for target in &self.targets {
             if let Target::Discrete { name: other, states } = target {
@@ -119,18 +119,18 @@ impl Answer {
     ///
     /// # Errors
     ///
-    /// As [`Answer::to_json_at`], which this is without points.
-    pub fn to_json(&self) -> Result<Value, ModelError> {
+    /// As [`Posterior::to_json_at`], which this is without points.
+    pub fn to_json(&self) -> Result<String, ModelError> {
         self.to_json_at(&[])
     }
 
-    /// [`Answer::to_json`] with `log_density` at each point of the continuous targets' joint space (and
+    /// [`Posterior::to_json`] with `log_density` at each point of the continuous targets' joint space (and
     /// `log_density_sphere` where the only target is a node of unit vectors).
     ///
     /// # Errors
     ///
     /// A point of the wrong length, points without a continuous target, [`ModelError::FlatAnswer`].
-    pub fn to_json_at(&self, at: &[Vec<f64>]) -> Result<Value, ModelError> {
+    pub fn to_json_at(&self, at: &[Vec<f64>]) -> Result<String, ModelError> {
         let mut out = Map::new();
         out.insert("log_evidence".into(), json!(self.log_evidence));
         if self.error_bound > 0.0 {
@@ -153,11 +153,11 @@ impl Answer {
         if !at.is_empty() {
             self.write_densities(at, &mut out)?;
         }
-        Ok(Value::Object(out))
+        Ok(Value::Object(out).to_string())
     }
 
-    /// [`Answer::sample`] as JSON: one object a sample, from target to state or array.
-    pub fn samples_json(&self, n: usize, seed: u64) -> Value {
+    /// [`Posterior::sample`] as JSON: one object a sample, from target to state or array.
+    pub fn samples_json(&self, n: usize, seed: u64) -> String {
         let samples = self.sample(n, seed).into_iter().map(|(states, point)| {
             let (mut states, mut left) = (states.into_iter(), &point[..]);
             let pairs = self.targets.iter().map(|target| match target {
@@ -172,7 +172,7 @@ impl Answer {
             });
             Value::Object(pairs.collect())
         });
-        Value::Array(samples.collect())
+        Value::Array(samples.collect()).to_string()
     }
 
     /// The modes of the continuous targets' joint density as JSON, the highest first: `[{"mode", "log_density"}]`.
@@ -180,7 +180,7 @@ impl Answer {
     /// # Errors
     ///
     /// [`ModelError::FlatAnswer`] where there is no density, or no continuous target.
-    pub fn modes_json(&self) -> Result<Value, ModelError> {
+    pub fn modes_json(&self) -> Result<String, ModelError> {
         let mixture = self.joint_mixture();
         let names: Vec<&str> = self.targets.iter().map(Target::name).collect();
         let modes = (mixture.dim() > 0).then(|| mixture.modes()).flatten();
@@ -190,13 +190,13 @@ impl Answer {
         let modes = modes
             .iter()
             .map(|(mode, log)| json!({ "mode": mode.as_slice(), "log_density": log }));
-        Ok(Value::Array(modes.collect()))
+        Ok(Value::Array(modes.collect()).to_string())
     }
 
     fn write_marginal(&self, target: &Target, out: &mut Map<String, Value>) {
         match target {
             Target::Discrete { name, states } => {
-                let probabilities = self.posterior(name).unwrap_or_default();
+                let probabilities = self.probabilities(name).unwrap_or_default();
                 let pairs = states
                     .iter()
                     .cloned()

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use crate::cpd::Cpd;
 use crate::error::ModelError;
+use crate::extra::parse;
 use crate::model::Model;
 
 impl Model {
@@ -42,21 +43,20 @@ impl Model {
         model
     }
 
-    /// The same model with other priors: `"trained"`, `"uniform"`, or `{"task": {"pouring": 0.5, …}}`; states left out
-    /// get 0, and the numbers are divided by their sum.
+    /// The same model with other priors, as JSON: `{"task": {"pouring": 0.5, …}}`; states left out get 0, and the numbers
+    /// are divided by their sum.
     ///
     /// # Errors
     ///
-    /// The value is none of these, or names unknown nodes or states.
-    pub fn with_priors_json(&self, value: &Value) -> Result<Self, ModelError> {
+    /// The text is nothing like it, or names unknown nodes or states.
+    pub fn with_priors_json(&self, json: &str) -> Result<Self, ModelError> {
+        let value = parse("prior", json)?;
         let bad = || ModelError::BadValue {
             node: "prior".into(),
             found: value.to_string(),
-            expected: "\"trained\", \"uniform\" or {NODE: {STATE: probability}} with a positive sum".into(),
+            expected: "{NODE: {STATE: probability}} with a positive sum".into(),
         };
-        match value {
-            Value::String(word) if word == "trained" => Ok(self.clone()),
-            Value::String(word) if word == "uniform" => Ok(self.with_uniform_priors()),
+        match &value {
             Value::Object(nodes) => {
                 let mut model = self.clone();
                 for (name, prior) in nodes {

@@ -9,7 +9,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DMatrix;
 
-use crate::answer::{Answer, Target};
 use crate::block::{BlockSum, Latent};
 use crate::cpd::{Cpd, MixtureCpd, NodeIdx};
 use crate::elimination::{Elimination, Tables, full_value};
@@ -19,6 +18,7 @@ use crate::gaussian::{log_add, log_sum_exp};
 use crate::log_table::LogTable;
 use crate::mixture::Term;
 use crate::model::Model;
+use crate::posterior::{Posterior, Target};
 use crate::root_gaussian::RootGaussian;
 
 /// Terms of an answer; the lightest beyond are left out, and count towards the error bound.
@@ -39,7 +39,7 @@ impl Model {
     /// # Source
     ///
     /// Eq. 1 and section IV; conditional Gaussians as in Lauritzen (1992).
-    pub fn posterior(&self, targets: &[&str], evidence: &Evidence) -> Result<Answer, ModelError> {
+    pub fn query(&self, targets: &[&str], evidence: &Evidence) -> Result<Posterior, ModelError> {
         let mut asked = Vec::with_capacity(targets.len());
         for target in targets {
             let idx = self.index(target)?;
@@ -54,7 +54,7 @@ impl Model {
                 return Err(ModelError::BadValue {
                     node: (*target).into(),
                     found: "a von_mises_fisher_mixture as one of the targets".into(),
-                    expected: "to be asked about alone, by `direction_posterior`".into(),
+                    expected: "to be asked about alone, by `query_direction`".into(),
                 });
             }
             asked.push(idx);
@@ -73,15 +73,15 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`]; [`ModelError::Pruned`] where it could only be bounded.
+    /// As [`Model::query`]; [`ModelError::Pruned`] where it could only be bounded.
     pub fn log_evidence(&self, evidence: &Evidence) -> Result<f64, ModelError> {
-        let answer = self.posterior(&[], evidence)?;
+        let answer = self.query(&[], evidence)?;
         answer.exact()?;
         Ok(answer.log_evidence)
     }
 }
 
-impl Answer {
+impl Posterior {
     /// Refuses an answer that is only bounded.
     pub(crate) fn exact(&self) -> Result<(), ModelError> {
         if self.error_bound > ROUNDING {
@@ -96,7 +96,7 @@ impl Answer {
 /// Sums of a block with targets, by the states of its scope.
 type Sums = BTreeMap<Vec<usize>, BlockSum>;
 
-fn run(query: &Elimination) -> Result<Answer, ModelError> {
+fn run(query: &Elimination) -> Result<Posterior, ModelError> {
     let tables = query.tables(false)?;
     let mut written: BTreeSet<NodeIdx> = query.targets.iter().copied().collect();
     written.extend(
@@ -247,7 +247,7 @@ enum Place {
 }
 
 /// Normalizes, and puts the targets' dimensions into the order asked for.
-fn arrange(query: &Elimination, mut terms: Vec<Term>, log_evidence: f64, error_bound: f64) -> Answer {
+fn arrange(query: &Elimination, mut terms: Vec<Term>, log_evidence: f64, error_bound: f64) -> Posterior {
     let mut start = BTreeMap::new();
     let mut n_hidden = 0;
     for &idx in query.blocks.iter().flat_map(|block| &block.targets) {
@@ -303,5 +303,5 @@ fn arrange(query: &Elimination, mut terms: Vec<Term>, log_evidence: f64, error_b
         let states = std::mem::take(&mut term.states);
         *term = Term::new(term.log_weight, states, nalgebra::DVector::from_vec(means), root);
     }
-    Answer::new(log_evidence, targets, terms, error_bound)
+    Posterior::new(log_evidence, targets, terms, error_bound)
 }

@@ -197,7 +197,7 @@ impl Statistics {
             place: format!("`{KEY}`"),
             problem,
         };
-        let value: &Value = model.extra().get(KEY).ok_or_else(|| {
+        let value: &Value = model.extra().keys().get(KEY).ok_or_else(|| {
             bad("is missing, so this model does not say what it was trained on; train it anew".into())
         })?;
         let statistics: Self = serde_json::from_value(value.clone()).map_err(|e| bad(e.to_string()))?;

@@ -42,7 +42,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As [`Model::posterior`].
+    /// As [`Model::query`].
     pub fn surprise(&self, evidence: &Evidence) -> Result<Surprise, ModelError> {
         let mut plain = Evidence::new();
         for (idx, observation) in evidence.iter() {
@@ -121,7 +121,7 @@ impl Model {
     /// The marginal of a continuous node; `None` where it has too many components.
     fn marginal(&self, idx: NodeIdx) -> Result<Option<Mixture>, ModelError> {
         let name = &self.node(idx).name;
-        match self.posterior(&[name], &Evidence::new()) {
+        match self.query(&[name], &Evidence::new()) {
             Ok(answer) => Ok(answer.exact().ok().and_then(|()| answer.mixture(name))),
             Err(ModelError::Pruned { .. } | ModelError::TooManyTerms { .. }) => Ok(None),
             Err(other) => Err(other),
@@ -168,7 +168,7 @@ impl Surprise {
     }
 
     /// `{"log_evidence", "tail", "samples", "nodes": {NODE: tail}, "words"}`.
-    pub fn to_json(&self) -> Value {
+    pub fn to_json(&self) -> String {
         let nodes: Map<String, Value> = self
             .nodes
             .iter()
@@ -181,5 +181,6 @@ impl Surprise {
             "nodes": nodes,
             "words": self.words(),
         })
+        .to_string()
     }
 }

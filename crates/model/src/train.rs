@@ -7,12 +7,13 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
 use crate::assemble::{assemble, discrete_parents, name_cells};
 use crate::cell::{CellReport, CellTask, FittedCell, fit_cells, refit};
 use crate::cpd::{Cpd, DiscreteCpd, Sign};
 use crate::error::{ModelError, list};
+use crate::extra::Extra;
 use crate::family::{Cells, Family};
 use crate::gaps::{GapReport, fit_gaps, log_table};
 use crate::groups::read_groups;
@@ -22,7 +23,7 @@ use crate::statistics::{self, NodeStatistics, Statistics, shares};
 use crate::table::Table;
 use crate::von_mises_fisher_train::train_directions;
 
-/// Settings of [`train`]. The paper gives none of them.
+/// Settings of [`Model::fit`]. The paper gives none of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainOptions {
     /// Every random choice follows from it.
@@ -89,21 +90,21 @@ pub struct NodeReport {
     pub cells: Vec<CellReport>,
 }
 
-/// Fits all nodes of a network to a table.
-///
-/// # Errors
-///
-/// A column is missing or has a cell of the wrong kind; a node has no complete row; weights do not fit the rows.
-/// A configuration with too few rows is no error: it takes the fit over all configurations, with a warning.
-///
-/// # Source
-///
-/// Section IV-B (EM and BIC per node); the guard against one component per object is ours.
-pub fn train(network: &Network, table: &Table, options: &TrainOptions) -> Result<Trained, ModelError> {
-    learn(network, table, options, None)
-}
-
 impl Model {
+    /// Fits all nodes of a network to a table.
+    ///
+    /// # Errors
+    ///
+    /// A column is missing or has a cell of the wrong kind; a node has no complete row; weights do not fit the rows.
+    /// A configuration with too few rows is no error: it takes the fit over all configurations, with a warning.
+    ///
+    /// # Source
+    ///
+    /// Section IV-B (EM and BIC per node); the guard against one component per object is ours.
+    pub fn fit(network: &Network, table: &Table, options: &TrainOptions) -> Result<Trained, ModelError> {
+        learn(network, table, options, None)
+    }
+
     /// The model after more rows, without those that it was trained on: training leaves in the model what it needs to go
     /// on (`statistics` in the file).
     ///
@@ -114,20 +115,20 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// The model keeps no statistics (a person wrote it, or another program); as [`train`].
+    /// The model keeps no statistics (a person wrote it, or another program); as [`Model::fit`].
     ///
     /// # Examples
     ///
     /// ```
-    /// use prehend_model::{Network, Table, TrainOptions, train};
+    /// use prehend_model::{Model, Network, Table, TrainOptions};
     ///
     /// let network = Network::from_toml("[[node]]\nname = \"width\"\nkind = \"gaussian_mixture\"\nmixture = { components = 1 }\n")?;
     /// let rows = |values: &[f64]| Table::new(values.len()).with_numbers("width", values.to_vec());
     /// let options = TrainOptions::default();
-    /// let before = train(&network, &rows(&[0.03, 0.05, 0.04, 0.06])?, &options)?.model;
+    /// let before = Model::fit(&network, &rows(&[0.03, 0.05, 0.04, 0.06])?, &options)?.model;
     /// let after = before.update(&rows(&[0.08, 0.07])?, &options)?.model;
-    /// let at_once = train(&network, &rows(&[0.03, 0.05, 0.04, 0.06, 0.08, 0.07])?, &options)?.model;
-    /// let mean = |model: &prehend_model::Model| model.posterior(&["width"], &Default::default()).map(|a| a.terms[0].mean[0]);
+    /// let at_once = Model::fit(&network, &rows(&[0.03, 0.05, 0.04, 0.06, 0.08, 0.07])?, &options)?.model;
+    /// let mean = |model: &Model| model.query(&["width"], &Default::default()).map(|a| a.terms[0].mean[0]);
     /// assert!((mean(&after)? - mean(&at_once)?).abs() < 1e-12);
     /// # Ok::<(), prehend_model::ModelError>(())
     /// ```
@@ -292,7 +293,7 @@ fn learn(
         nodes.push(Node {
             name: node.name.clone(),
             cpd,
-            extra,
+            extra: Extra::new(extra),
         });
         reports.push(report);
     }
@@ -308,7 +309,7 @@ fn learn(
         ("provenance".to_string(), provenance),
         (statistics::KEY.to_string(), json!(statistics)),
     ];
-    let model = Model::new(nodes, Map::from_iter(extra))?;
+    let model = Model::new(nodes, Extra::new(Map::from_iter(extra)))?;
     let log_likelihood = model.log_likelihood(table)?.iter().sum();
     let n_parameters = model.n_parameters();
     let report = TrainReport {
@@ -377,8 +378,8 @@ impl NodeReport {
     }
 
     /// The report as JSON.
-    pub fn to_json(&self) -> Value {
-        json!(self)
+    pub fn to_json(&self) -> String {
+        json!(self).to_string()
     }
 }
 

@@ -1,190 +1,211 @@
-//! Hidden continuous nodes of one configuration, compiled: the combinations of components as a tree, each of whose
-//! branches reads the row through one whitened matrix.
+//! The continuous nodes of one configuration, compiled: the combinations of components as a tree, one level for each
+//! node, parents first.
 //!
-//! A path through the tree chooses a component at each node of the block. What it contributes is a product of one
-//! Gaussian density for each observed node, given the hidden ones' components and the observations before it:
+//! A path through the tree chooses a component at each node. A hidden node appends its mean to those carried along; an
+//! observed one contributes a Gaussian density, given the hidden ones' components and the observations before it, and
+//! moves the means:
 //!
 //! ```text
-//! log term = Σ over branches of constant − ½ |reader · [row, 1]|²
+//! residual = reading · [row, 1] − coefficients · means
+//! log term += constant − ½ |white · residual|²
+//! means    += pull · residual
 //! ```
 //!
-//! so that all factorization of matrices is done beforehand. A subtree is left out where a bound of all it holds is
-//! below the largest term by more than rounding.
-
-use std::ops::Range;
+//! Readings and coefficients belong to the component alone, constant, white and pull to the path; all factorization of
+//! matrices is done beforehand, and a branch costs the same however long the row is.
 
 use nalgebra::DMatrix;
 
 use crate::block::Step;
-use crate::gaussian::{log_add, log_sum_exp};
-use crate::model::Model;
-use crate::reader::{LogSum, Reader, Readers};
+use crate::gaussian::log_sum_exp;
 use crate::root_gaussian::RootGaussian;
+use crate::von_mises_fisher::{VonMisesFisher, log_normalizer};
 
-/// Terms this far below the largest one are left out, in nats: e⁻⁴⁵ = 3e-20, and a tree has fewer than 1e6 terms, so
-/// at most 3e-14 of the result goes missing.
-const NEGLIGIBLE: f64 = 45.0;
 /// Branches of the largest tree that is compiled.
-const MAX_BRANCHES: usize = 200_000;
+const MAX_BRANCHES: usize = 400_000;
 
-/// The compiled block.
+/// The compiled nodes.
+#[derive(Default)]
 pub(crate) struct Tree {
-    readers: Readers,
-    branches: Vec<Branch>,
-    top: Range<usize>,
-    /// log weight of the paths that observe nothing.
-    bare: f64,
+    pub levels: Vec<Level>,
+    pub n_hidden: usize,
 }
 
-struct Branch {
-    /// log weight and normalizer.
-    constant: f64,
-    reader: Reader,
-    /// log of the most that the branches below can contribute.
-    below: f64,
-    children: Range<usize>,
-    /// log weight of the paths that end here.
-    end: f64,
+/// The components of one node, and what each branch has of its own.
+pub(crate) struct Level {
+    pub dim: usize,
+    pub n_alternatives: usize,
+    /// Where the values of a hidden node start among the means; none for an observed one.
+    pub start: Option<usize>,
+    /// Columns of [row, 1] that readings use; per alternative dim × columns.
+    pub columns: Vec<usize>,
+    pub reading: Vec<f64>,
+    /// Means that are read; per alternative dim × as many.
+    pub hidden_columns: Vec<usize>,
+    pub coefficients: Vec<f64>,
+    /// Means that are moved, as a later level reads them; per branch as many × dim.
+    pub moved: Vec<usize>,
+    pub pull: Vec<f64>,
+    /// Per branch log weight and normalizer.
+    pub constant: Vec<f64>,
+    /// Per branch the lower triangle, row by row; empty where readings are white already.
+    pub white: Vec<f64>,
+    /// Per branch the log of the most that all below can contribute.
+    pub below: Vec<f64>,
 }
 
 impl Tree {
     /// `None` where a component has no density, or the tree would be too large.
-    pub fn grow(model: &Model, steps: &[Step], columns: usize) -> Option<Self> {
-        let mut grown = Grown::default();
-        let (top, bare) = grow(model, steps, &RootGaussian::empty(columns), &mut grown)?;
-        Some(Self {
-            readers: grown.readers,
-            branches: grown.branches,
-            top,
-            bare,
-        })
-    }
-
-    /// log of the block's integral at [row, 1].
-    pub fn log_integral(&self, row: &[f64], open: &mut Vec<(f64, f64, usize)>) -> f64 {
-        let mut sum = LogSum::default();
-        sum.add(self.bare);
-        open.clear();
-        self.open(self.top.clone(), 0.0, row, &mut sum, open);
-        // The most promising subtree is opened first: what is left out later is compared with the largest term.
-        while let Some((bound, value, i)) = open.pop() {
-            if bound >= sum.largest() - NEGLIGIBLE {
-                sum.add(value + self.branches[i].end);
-                self.open(self.branches[i].children.clone(), value, row, &mut sum, open);
+    pub fn grow(steps: &[Step]) -> Option<Self> {
+        let mut tree = Self::default();
+        let mut n_branches = 1usize;
+        for (depth, step) in steps.iter().enumerate() {
+            n_branches = n_branches.checked_mul(step.n_alternatives())?;
+            if n_branches > MAX_BRANCHES {
+                return None;
             }
+            let start = (!step.is_observed()).then_some(tree.n_hidden);
+            let level = Level::of(step, start, &steps[depth + 1..]);
+            tree.n_hidden += start.map_or(0, |_| level.dim);
+            tree.levels.push(level);
         }
-        sum.value()
+        descend(steps, &mut tree.levels, &RootGaussian::empty(0))?;
+        for depth in (1..tree.levels.len()).rev() {
+            let (above, here) = tree.levels.split_at_mut(depth);
+            let peaks = here[0].constant.iter().zip(&here[0].below);
+            let peaks: Vec<f64> = peaks.map(|(constant, below)| constant + below).collect();
+            above[depth - 1].below = peaks.chunks(here[0].n_alternatives).map(log_sum_exp).collect();
+        }
+        Some(tree)
     }
 
-    /// Adds up leaves, and puts other branches on the stack, the one with the highest bound on top.
-    fn open(
-        &self,
-        range: Range<usize>,
-        value: f64,
-        row: &[f64],
-        sum: &mut LogSum,
-        open: &mut Vec<(f64, f64, usize)>,
-    ) {
-        let start = open.len();
-        for i in range {
-            let branch = &self.branches[i];
-            let value = value + branch.constant - 0.5 * self.readers.norm_squared(branch.reader, row);
-            if branch.children.is_empty() {
-                sum.add(value + branch.end);
-                continue;
+    /// Observed directions that start at this column: on the unit sphere κ μ·x = κ − ½ κ |x − μ|².
+    pub fn of_directions(components: &[VonMisesFisher], start: usize, width: usize) -> Self {
+        let components: Vec<&VonMisesFisher> = components.iter().filter(|c| c.weight > 0.0).collect();
+        let dim = components.first().map_or(0, |c| c.direction.len());
+        let mut level = Level::empty(dim, components.len(), None);
+        level.columns = (start..start + dim).chain([width]).collect();
+        for component in components {
+            let root = component.concentration.sqrt();
+            for i in 0..dim {
+                let entry = |j: usize| if j == i { root } else { 0.0 };
+                level.reading.extend((0..dim).map(entry));
+                level.reading.push(-root * component.direction[i]);
             }
-            let entry = (value + branch.below, value, i);
-            // Insertion: there are few.
-            let mut place = open.len();
-            open.push(entry);
-            while place > start && open[place - 1].0 > entry.0 {
-                open[place] = open[place - 1];
-                place -= 1;
-            }
-            open[place] = entry;
+            level
+                .constant
+                .push(component.weight.ln() + log_normalizer(dim, component.concentration));
+        }
+        level.below = vec![0.0; level.constant.len()];
+        Self {
+            levels: vec![level],
+            n_hidden: 0,
         }
     }
 }
 
-/// What has grown so far.
-#[derive(Default)]
-struct Grown {
-    readers: Readers,
-    branches: Vec<Branch>,
+impl Level {
+    fn empty(dim: usize, n_alternatives: usize, start: Option<usize>) -> Self {
+        Self {
+            dim,
+            n_alternatives,
+            start,
+            columns: Vec::new(),
+            reading: Vec::new(),
+            hidden_columns: Vec::new(),
+            coefficients: Vec::new(),
+            moved: Vec::new(),
+            pull: Vec::new(),
+            constant: Vec::new(),
+            white: Vec::new(),
+            below: Vec::new(),
+        }
+    }
+
+    /// What belongs to the components alone.
+    fn of(step: &Step, start: Option<usize>, later: &[Step]) -> Self {
+        let readings: Vec<DMatrix<f64>> = (0..step.n_alternatives()).map(|i| step.reading(i)).collect();
+        let dim = readings.first().map_or(0, DMatrix::nrows);
+        let mut level = Self::empty(dim, readings.len(), start);
+        level.columns = used_columns(readings.iter());
+        level.reading = entries(readings.iter(), &level.columns);
+        let coefficients = || (0..step.n_alternatives()).map(|i| step.coefficients(i));
+        level.hidden_columns = used_columns(coefficients());
+        level.coefficients = entries(coefficients(), &level.hidden_columns);
+        if start.is_none() && !level.hidden_columns.is_empty() {
+            let all = later
+                .iter()
+                .flat_map(|step| (0..step.n_alternatives()).map(|i| step.coefficients(i)));
+            let known = step.coefficients(0).ncols();
+            level.moved = used_columns(all).into_iter().filter(|&j| j < known).collect();
+        }
+        level
+    }
+
+    /// Whether residuals are white as they are read: nothing hidden is read.
+    fn is_white(&self) -> bool {
+        self.start.is_none() && self.hidden_columns.is_empty()
+    }
+
+    /// Multiplies the readings of one alternative by its whitening matrix.
+    fn whiten(&mut self, i: usize, white: &DMatrix<f64>) {
+        let n = self.columns.len();
+        let part = &mut self.reading[i * self.dim * n..(i + 1) * self.dim * n];
+        let product = white * DMatrix::from_row_slice(self.dim, n, part);
+        for (slot, value) in part.iter_mut().zip(product.transpose().iter()) {
+            *slot = *value;
+        }
+    }
 }
 
-/// Branches for the first observation among the steps, and the log weight of paths without one.
-fn grow(
-    model: &Model,
-    steps: &[Step],
-    gaussian: &RootGaussian,
-    grown: &mut Grown,
-) -> Option<(Range<usize>, f64)> {
-    let mut level = Vec::new();
-    let mut bare = f64::NEG_INFINITY;
-    collect(model, steps, (0.0, gaussian), &mut level, &mut bare)?;
-    if grown.branches.len() + level.len() > MAX_BRANCHES {
-        return None;
+/// Columns in which some matrix is not zero.
+fn used_columns<'a>(matrices: impl Iterator<Item = &'a DMatrix<f64>>) -> Vec<usize> {
+    let mut used = std::collections::BTreeSet::new();
+    for matrix in matrices {
+        used.extend((0..matrix.ncols()).filter(|&j| matrix.column(j).iter().any(|v| *v != 0.0)));
     }
-    let start = grown.branches.len();
-    let mut pending = Vec::with_capacity(level.len());
-    for found in level {
-        grown.branches.push(Branch {
-            constant: found.constant,
-            reader: grown.readers.push(&found.white),
-            below: 0.0,
-            children: 0..0,
-            end: f64::NEG_INFINITY,
-        });
-        pending.push((found.gaussian, found.rest));
-    }
-    let end = grown.branches.len();
-    for (i, (gaussian, rest)) in (start..end).zip(pending) {
-        let (children, bare) = grow(model, rest, &gaussian, grown)?;
-        let below = |branch: &Branch| branch.constant + branch.below;
-        let peaks: Vec<f64> = grown.branches[children.clone()].iter().map(below).collect();
-        let branch = &mut grown.branches[i];
-        branch.below = log_add(bare, log_sum_exp(&peaks));
-        branch.end = bare;
-        branch.children = children;
-    }
-    Some((start..end, bare))
+    used.into_iter().collect()
 }
 
-struct Found<'a> {
-    constant: f64,
-    white: DMatrix<f64>,
-    gaussian: RootGaussian,
-    rest: &'a [Step],
+/// These columns of all matrices, row by row.
+fn entries<'a>(matrices: impl Iterator<Item = &'a DMatrix<f64>>, columns: &[usize]) -> Vec<f64> {
+    let mut out = Vec::new();
+    for matrix in matrices {
+        for row in matrix.row_iter() {
+            out.extend(columns.iter().map(|&j| row[j]));
+        }
+    }
+    out
 }
 
-/// Walks over hidden nodes until something is observed.
-fn collect<'a>(
-    model: &Model,
-    steps: &'a [Step],
-    (log_weight, gaussian): (f64, &RootGaussian),
-    out: &mut Vec<Found<'a>>,
-    bare: &mut f64,
-) -> Option<()> {
+/// What belongs to the branches, depth first: every level gets its branches in the order of their paths.
+fn descend(steps: &[Step], levels: &mut [Level], gaussian: &RootGaussian) -> Option<()> {
     let Some((step, rest)) = steps.split_first() else {
-        *bare = log_add(*bare, log_weight);
         return Some(());
     };
     for i in 0..step.n_alternatives() {
-        let (constant, white, after) = step.enter(model, i, gaussian).ok()?;
-        let constant = log_weight + constant;
-        match white {
-            Some(white) => out.push(Found {
-                constant,
-                white,
-                gaussian: after,
-                rest,
-            }),
-            None => collect(model, rest, (constant, &after), out, bare)?,
+        let dim = levels[0].dim;
+        // Residuals of the unit vectors, and means of zero: what comes back is white, and the means are the pull.
+        let mut before = gaussian.clone();
+        before.mean = DMatrix::zeros(before.dim(), dim);
+        let (constant, white, after) = step.enter_residuals(i, &before, &DMatrix::identity(dim, dim))?;
+        let level = &mut levels[0];
+        if let Some(white) = white {
+            if level.is_white() {
+                if level.constant.len() < level.n_alternatives {
+                    level.whiten(i, &white);
+                }
+            } else {
+                let rows = (0..dim).flat_map(|r| (0..=r).map(move |c| (r, c)));
+                level.white.extend(rows.map(|place| white[place]));
+            }
+            for &j in &level.moved {
+                level.pull.extend((0..dim).map(|c| after.mean[(j, c)]));
+            }
         }
-        if out.len() > MAX_BRANCHES {
-            return None;
-        }
+        level.constant.push(constant);
+        level.below.push(0.0);
+        descend(rest, &mut levels[1..], &after)?;
     }
     Some(())
 }

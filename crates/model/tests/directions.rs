@@ -1,7 +1,11 @@
 //! Unit vectors: densities on the sphere against scipy, latent signs, and von Mises–Fisher nodes in a network.
 
-use prehend_model::{Cpd, Evidence, Model, Network, StructureOptions, TrainOptions, learn_structure, train};
+use prehend_model::{Cpd, Evidence, Model, Network, StructureOptions, TrainOptions, learn_structure};
 use serde_json::{Value, json};
+
+fn read(json: &str) -> Value {
+    serde_json::from_str(json).unwrap()
+}
 
 fn oracle() -> Value {
     serde_json::from_str(include_str!("oracle/directions.json")).unwrap()
@@ -81,11 +85,8 @@ fn a_gaussian_mixture_on_the_sphere_agrees_with_quadrature_also_with_a_latent_si
             "components": [[component(0), component(1)]] }] });
         let model = Model::from_json(&node.to_string()).unwrap();
         let at: Vec<Vec<f64>> = case["at"].as_array().unwrap().iter().map(numbers).collect();
-        let answer = model
-            .posterior(&["u"], &Evidence::new())
-            .unwrap()
-            .to_json_at(&at)
-            .unwrap();
+        let answer = model.query(&["u"], &Evidence::new()).unwrap();
+        let answer = read(&answer.to_json_at(&at).unwrap());
         for (found, expected) in numbers(&answer["log_density_sphere"])
             .iter()
             .zip(numbers(&case[sign]))
@@ -98,11 +99,8 @@ fn a_gaussian_mixture_on_the_sphere_agrees_with_quadrature_also_with_a_latent_si
         if sign == "latent" {
             // q and −q are the same orientation: in the posterior, as evidence, and among samples.
             let minus: Vec<Vec<f64>> = at.iter().map(|x| x.iter().map(|v| -v).collect()).collect();
-            let other = model
-                .posterior(&["u"], &Evidence::new())
-                .unwrap()
-                .to_json_at(&minus)
-                .unwrap();
+            let other = model.query(&["u"], &Evidence::new()).unwrap();
+            let other = read(&other.to_json_at(&minus).unwrap());
             let pairs = numbers(&answer["log_density_sphere"])
                 .into_iter()
                 .zip(numbers(&other["log_density_sphere"]));
@@ -124,11 +122,11 @@ fn the_posterior_of_a_direction_weighs_its_mixtures() {
     let model = model();
     let evidence = Evidence::new().with_value(&model, "width", &[0.12]).unwrap();
     let task = model
-        .posterior(&["task"], &evidence)
+        .query(&["task"], &evidence)
         .unwrap()
-        .posterior("task")
+        .probabilities("task")
         .unwrap();
-    let answer = model.direction_posterior("upos", &evidence).unwrap();
+    let answer = model.query_direction("upos", &evidence).unwrap();
     let weights: Vec<f64> = answer.components.iter().map(|c| c.weight).collect();
     assert!((weights[0] - 0.7 * task[0]).abs() < 1e-12);
     assert!((weights[2] - task[1]).abs() < 1e-12);
@@ -144,12 +142,12 @@ fn the_posterior_of_a_direction_weighs_its_mixtures() {
         .with_value(&model, "upos", &[0.0, 0.0, 1.0])
         .unwrap();
     let posterior = model
-        .posterior(&["task"], &seen)
+        .query(&["task"], &seen)
         .unwrap()
-        .posterior("task")
+        .probabilities("task")
         .unwrap();
     assert!(posterior[0] > 0.99);
-    let json = answer.to_json_at(&[point.to_vec()]).unwrap();
+    let json = read(&answer.to_json_at(&[point.to_vec()]).unwrap());
     assert_eq!(json["components"].as_array().unwrap().len(), 3);
     assert!(json["log_density_sphere"][0].is_number());
 }
@@ -159,7 +157,7 @@ fn training_recovers_a_model_and_files_hold_it() {
     let table = model().sample(1500, 2);
     let network = Network::from_toml(NETWORK).unwrap();
     assert_eq!(Network::from_toml(&network.to_toml()).unwrap(), network);
-    let trained = train(&network, &table, &TrainOptions::default()).unwrap();
+    let trained = Model::fit(&network, &table, &TrainOptions::default()).unwrap();
     assert_eq!(trained.report.nodes[1].components(), [2, 1]);
     let held_out = model().sample(1000, 77);
     let mean = |model: &Model| model.log_likelihood(&held_out).unwrap().iter().sum::<f64>() / 1000.0;
@@ -226,12 +224,9 @@ fn what_cannot_be_combined_says_what_to_do() {
             .starts_with("`u`: `columns` is 1 columns")
     );
     let model = model();
-    let error = model
-        .posterior(&["upos"], &Evidence::new())
-        .unwrap_err()
-        .to_string();
+    let error = model.query(&["upos"], &Evidence::new()).unwrap_err().to_string();
     assert!(
-        error.contains("asked about alone, by `direction_posterior`"),
+        error.contains("asked about alone, by `query_direction`"),
         "{error}"
     );
     let error = Evidence::new()

@@ -5,6 +5,14 @@
 use prehend_model::{BatchQuery, Cpd, Evidence, Model, ModelError, Observation};
 use serde_json::{Value, json};
 
+fn read(json: &str) -> Value {
+    serde_json::from_str(json).unwrap()
+}
+
+fn evidence_of(model: &Model, json: &Value) -> Result<Evidence, ModelError> {
+    Evidence::from_json(model, &json.to_string())
+}
+
 fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(entries) => entries.iter().flat_map(numbers).collect(),
@@ -46,14 +54,14 @@ fn every_kind_of_evidence_gives_what_sixty_digits_give() {
                 .iter()
                 .map(|t| t.as_str().unwrap())
                 .collect();
-            let evidence = Evidence::from_json(&model, &case["evidence"]).unwrap();
+            let evidence = evidence_of(&model, &case["evidence"]).unwrap();
             let answer = model
-                .posterior(&targets, &evidence)
+                .query(&targets, &evidence)
                 .unwrap_or_else(|e| panic!("{what}: {e}"));
             close(answer.log_evidence, case["log_evidence"].as_f64().unwrap(), &what);
             assert_eq!(answer.error_bound, 0.0, "{what}");
             for (name, expected) in case["posterior"].as_object().into_iter().flatten() {
-                all_close(answer.posterior(name).unwrap(), expected, &what);
+                all_close(answer.probabilities(name).unwrap(), expected, &what);
             }
             if case.get("mean").is_some() {
                 let mixture = answer.joint_mixture();
@@ -79,7 +87,7 @@ fn every_kind_of_evidence_gives_what_sixty_digits_give() {
                 }
             }
             if let Some(joint) = case.get("joint").and_then(Value::as_object) {
-                let printed = answer.to_json().unwrap();
+                let printed = read(&answer.to_json().unwrap());
                 for term in printed["joint"].as_array().unwrap() {
                     let states: Vec<&str> = targets
                         .iter()
@@ -140,7 +148,7 @@ const FLAT: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
 #[test]
 fn evidence_without_density_names_node_and_component() {
     let model = Model::from_json(&FLAT.replace(['P', 'Q'], "0.5")).unwrap();
-    let ask = |json: Value| model.posterior(&["task"], &Evidence::from_json(&model, &json).unwrap());
+    let ask = |json: Value| model.query(&["task"], &evidence_of(&model, &json).unwrap());
     let flat = |node: &str, configuration, component| ModelError::NoDensity {
         node: node.into(),
         configuration,
@@ -162,9 +170,9 @@ fn evidence_without_density_names_node_and_component() {
     // A prior of zero, or hard evidence against it, keeps the flat component out of the sum.
     assert!(ask(json!({ "task": "a", "x": 0.5 })).is_ok());
     let never = Model::from_json(&FLAT.replace('P', "1").replace('Q', "0")).unwrap();
-    let x = Evidence::from_json(&never, &json!({ "x": 0.5 })).unwrap();
+    let x = evidence_of(&never, &json!({ "x": 0.5 })).unwrap();
     assert_eq!(
-        never.posterior(&["task"], &x).unwrap().posterior("task").unwrap(),
+        never.query(&["task"], &x).unwrap().probabilities("task").unwrap(),
         [1.0, 0.0]
     );
 }

@@ -3,6 +3,10 @@
 use prehend_model::{Evidence, Export, Model, ModelError};
 use serde_json::{Value, json};
 
+fn evidence_of(model: &Model, json: &Value) -> Result<Evidence, ModelError> {
+    Evidence::from_json(model, &json.to_string())
+}
+
 const MIXED: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
     { "name": "rain", "kind": "discrete", "states": ["no", "yes"], "table": [[0.8, 0.2]] },
     { "name": "task", "kind": "discrete", "states": ["hand-over", "pouring"], "parents": ["rain"],
@@ -72,25 +76,24 @@ fn a_mixed_model_answers_the_same_after_net() {
         (json!({ "grip": 4.0 }), json!({ "grip": 4.0 })),
     ] {
         // Where the second component of pouring is flat, the whole vector has no density.
-        let Ok(ours) = model.posterior(&["task", "rain"], &Evidence::from_json(&model, &ours).unwrap())
-        else {
+        let Ok(ours) = model.query(&["task", "rain"], &evidence_of(&model, &ours).unwrap()) else {
             assert!(
                 scalar
-                    .posterior(&["task"], &Evidence::from_json(&scalar, &theirs).unwrap())
+                    .query(&["task"], &evidence_of(&scalar, &theirs).unwrap())
                     .is_err()
             );
             continue;
         };
         let theirs = scalar
-            .posterior(&["task", "rain"], &Evidence::from_json(&scalar, &theirs).unwrap())
+            .query(&["task", "rain"], &evidence_of(&scalar, &theirs).unwrap())
             .unwrap();
         assert!((ours.log_evidence - theirs.log_evidence).abs() < 1e-10);
         for node in ["task", "rain"] {
             for (a, b) in ours
-                .posterior(node)
+                .probabilities(node)
                 .unwrap()
                 .iter()
-                .zip(theirs.posterior(node).unwrap())
+                .zip(theirs.probabilities(node).unwrap())
             {
                 assert!((a - b).abs() < 1e-12);
             }
@@ -114,9 +117,9 @@ fn files_of_bnlearn_style_are_read() {
     let model = Model::from_bif(text).unwrap();
     let wet = Evidence::new().with_state(&model, "wet grass", "yes").unwrap();
     let rain = model
-        .posterior(&["rain"], &wet)
+        .query(&["rain"], &wet)
         .unwrap()
-        .posterior("rain")
+        .probabilities("rain")
         .unwrap()[1];
     let yes = 0.2 * 0.666 / 0.999;
     assert!((rain - yes / (yes + 0.08)).abs() < 1e-12);
@@ -127,8 +130,8 @@ fn files_of_bnlearn_style_are_read() {
     );
     let model = Model::from_bif(&whole).unwrap();
     let rain = Evidence::new().with_state(&model, "rain", "yes").unwrap();
-    let wet = model.posterior(&["wet grass"], &rain).unwrap();
-    assert!((wet.posterior("wet grass").unwrap()[1] - 0.6).abs() < 1e-12);
+    let wet = model.query(&["wet grass"], &rain).unwrap();
+    assert!((wet.probabilities("wet grass").unwrap()[1] - 0.6).abs() < 1e-12);
 }
 
 #[test]
@@ -240,11 +243,11 @@ fn files_of_pgmpy_and_pyagrum_are_read_and_they_read_ours() {
     ];
     for (file, model) in files {
         let model = model.unwrap_or_else(|e| panic!("{file}: {e}"));
-        let seen = Evidence::from_json(&model, &json!({ "wet": "soaked", "sprinkler": "off" })).unwrap();
+        let seen = evidence_of(&model, &json!({ "wet": "soaked", "sprinkler": "off" })).unwrap();
         let season = model
-            .posterior(&["season"], &seen)
+            .query(&["season"], &seen)
             .unwrap()
-            .posterior("season")
+            .probabilities("season")
             .unwrap();
         for (found, expected) in season
             .iter()

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{fit, held_out, network, truth};
-use prehend_model::{Column, Model, Network, Table, TrainOptions, train};
+use prehend_model::{Column, Model, Network, Table, TrainOptions};
 
 fn numbers(table: &Table, name: &str) -> Vec<f64> {
     table.numbers(name, "test").unwrap()
@@ -46,7 +46,7 @@ fn a_weight_of_two_is_a_row_twice() {
             weights: Some(weights),
             ..TrainOptions::default()
         };
-        let weighted = train(&Network::from_toml(&network(mixture)).unwrap(), &table, &options).unwrap();
+        let weighted = Model::fit(&Network::from_toml(&network(mixture)).unwrap(), &table, &options).unwrap();
         // Uneven weights count for fewer independent rows, which the priors alone notice.
         same(&weighted.model, &fit(&network(mixture), &twice).model, 1e-2);
     }
@@ -61,7 +61,7 @@ fn equal_weights_of_any_size_change_nothing() {
             weights: Some(vec![weight; 300]),
             ..TrainOptions::default()
         };
-        train(&Network::from_toml(&network).unwrap(), &table, &options)
+        Model::fit(&Network::from_toml(&network).unwrap(), &table, &options)
             .unwrap()
             .model
     };

@@ -1,7 +1,11 @@
 //! Numbers from other programs: brute-force enumeration in numpy, mixtures from scikit-learn (`oracle/`).
 
-use prehend_model::{BatchQuery, Cpd, Evidence, Model, Network, Table, TrainOptions, train};
+use prehend_model::{BatchQuery, Cpd, Evidence, Model, ModelError, Network, Table, TrainOptions};
 use serde_json::Value;
+
+fn evidence_of(model: &Model, json: &Value) -> Result<Evidence, ModelError> {
+    Evidence::from_json(model, &json.to_string())
+}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value
@@ -34,10 +38,10 @@ fn every_query_agrees_with_enumeration_of_the_joint_mixture() {
     let model = Model::from_json(&oracle["model"].to_string()).unwrap();
     for case in oracle["cases"].as_array().unwrap() {
         let what = format!("{} given {}", case["target"], case["evidence"]);
-        let evidence = Evidence::from_json(&model, &case["evidence"]).unwrap();
+        let evidence = evidence_of(&model, &case["evidence"]).unwrap();
         let target = case["target"].as_str().unwrap();
         let answer = model
-            .posterior(&[target], &evidence)
+            .query(&[target], &evidence)
             .unwrap_or_else(|e| panic!("{what}: {e}"));
         close(
             &[answer.log_evidence],
@@ -47,7 +51,7 @@ fn every_query_agrees_with_enumeration_of_the_joint_mixture() {
         );
         if let Some(posterior) = case.get("posterior") {
             close(
-                &answer.posterior(target).unwrap(),
+                &answer.probabilities(target).unwrap(),
                 &numbers(posterior),
                 1e-9,
                 &what,
@@ -104,7 +108,7 @@ fn a_batch_gives_what_single_queries_give() {
                 }
             }
             let answer = answer.unwrap();
-            let single = model.posterior(&["task"], &evidence).unwrap();
+            let single = model.query(&["task"], &evidence).unwrap();
             close(
                 &[answer.log_evidence],
                 &[single.log_evidence],
@@ -113,7 +117,7 @@ fn a_batch_gives_what_single_queries_give() {
             );
             close(
                 &answer.posterior,
-                &single.posterior("task").unwrap(),
+                &single.probabilities("task").unwrap(),
                 1e-9,
                 &format!("{observed:?}"),
             );
@@ -136,7 +140,7 @@ fn a_fitted_mixture_is_the_one_that_scikit_learn_finds() {
         "[[node]]\nname = \"xy\"\nkind = \"gaussian_mixture\"\ncolumns = [\"x\", \"y\"]\nmixture = { max = 4, choose = \"bic\" }",
     )
     .unwrap();
-    let trained = train(
+    let trained = Model::fit(
         &network,
         &table,
         &TrainOptions {

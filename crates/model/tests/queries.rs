@@ -3,6 +3,14 @@
 use prehend_model::{Evidence, Latent, Model, ModelError, Observation};
 use serde_json::{Value, json};
 
+fn read(json: &str) -> Value {
+    serde_json::from_str(json).unwrap()
+}
+
+fn evidence_of(model: &Model, json: &Value) -> Result<Evidence, ModelError> {
+    Evidence::from_json(model, &json.to_string())
+}
+
 /// The example of docs/model-format.md.
 const EXAMPLE: &str = r#"{ "format": "prehend-model", "version": 1,
   "nodes": [
@@ -38,16 +46,16 @@ fn a_hand_written_model_answers_as_bayes_rule_says() {
     let hand_over = 0.4 * normal(x, [0.1, 0.2], unit);
     let pouring =
         0.6 * (0.3 * normal(x, [0.0, 0.0], unit) + 0.7 * normal(x, [2.0, 1.0], [[0.5, 0.1], [0.1, 0.5]]));
-    let evidence = Evidence::from_json(&model, &json!({ "size": x })).unwrap();
-    let answer = model.posterior(&["task"], &evidence).unwrap().to_json().unwrap();
+    let evidence = evidence_of(&model, &json!({ "size": x })).unwrap();
+    let answer = read(&model.query(&["task"], &evidence).unwrap().to_json().unwrap());
     let p = answer["posterior"]["pouring"].as_f64().unwrap();
     assert!((p - pouring / (pouring + hand_over)).abs() < 1e-12);
     assert!((answer["log_evidence"].as_f64().unwrap() - (pouring + hand_over).ln()).abs() < 1e-12);
-    let sizes = model.posterior(
+    let sizes = model.query(
         &["size"],
-        &Evidence::from_json(&model, &json!({ "task": "pouring" })).unwrap(),
+        &evidence_of(&model, &json!({ "task": "pouring" })).unwrap(),
     );
-    let sizes = sizes.unwrap().to_json_at(&[x.to_vec()]).unwrap();
+    let sizes = read(&sizes.unwrap().to_json_at(&[x.to_vec()]).unwrap());
     assert_eq!(sizes["components"].as_array().unwrap().len(), 2);
     assert!((sizes["mean"][0].as_f64().unwrap() - 1.4).abs() < 1e-12);
     assert!((sizes["log_density"][0].as_f64().unwrap() - (pouring / 0.6).ln()).abs() < 1e-12);
@@ -66,17 +74,14 @@ fn the_sprinkler_is_explained_away() {
     .unwrap();
     let wet = Evidence::new().with_state(&sprinkler, "wet", "yes").unwrap();
     let rain = sprinkler
-        .posterior(&["rain"], &wet)
+        .query(&["rain"], &wet)
         .unwrap()
-        .posterior("rain")
+        .probabilities("rain")
         .unwrap()[1];
     // 0.2 (0.01 · 0.99 + 0.99 · 0.8) / (that + 0.8 · 0.4 · 0.9): the textbook's 35.77 %.
     assert!((rain - 0.16038 / 0.44838).abs() < 1e-12);
-    let both = sprinkler
-        .posterior(&["rain", "sprinkler"], &wet)
-        .unwrap()
-        .to_json()
-        .unwrap();
+    let both = sprinkler.query(&["rain", "sprinkler"], &wet).unwrap();
+    let both = read(&both.to_json().unwrap());
     assert_eq!(both["joint"].as_array().unwrap().len(), 3);
     let story = sprinkler.most_probable(&wet, Latent::Summed).unwrap();
     assert_eq!(
@@ -95,25 +100,21 @@ fn the_order_of_evidence_does_not_matter() {
         .unwrap();
     let back = back.with_value(&model, "size", &[0.1, 0.2]).unwrap();
     assert_eq!(
-        model.posterior(&["task"], &there).unwrap(),
-        model.posterior(&["task"], &back).unwrap()
+        model.query(&["task"], &there).unwrap(),
+        model.query(&["task"], &back).unwrap()
     );
 }
 
 #[test]
 fn densities_integrate_to_one() {
     let model = oracle_model();
-    let evidence = Evidence::from_json(&model, &json!({ "task": "pouring", "size": [0.3, null] })).unwrap();
+    let evidence = evidence_of(&model, &json!({ "task": "pouring", "size": [0.3, null] })).unwrap();
     for (name, step) in [("qeps", 0.01), ("fvol", 0.01)] {
-        let mixture = model
-            .posterior(&[name], &evidence)
-            .unwrap()
-            .mixture(name)
-            .unwrap();
+        let mixture = model.query(&[name], &evidence).unwrap().mixture(name).unwrap();
         prehend_testkit::integrates_to_one_on_line(|x| mixture.log_density(&[x]).unwrap(), -20.0, 20.0, step);
     }
     let upos = model
-        .posterior(&["upos"], &evidence)
+        .query(&["upos"], &evidence)
         .unwrap()
         .mixture("upos")
         .unwrap();
@@ -124,22 +125,22 @@ fn densities_integrate_to_one() {
 #[test]
 fn evidence_sixty_deviations_out_still_has_an_answer() {
     let model = oracle_model();
-    let evidence = Evidence::from_json(
+    let evidence = evidence_of(
         &model,
         &json!({ "upos": [60.0, 0.0, -60.0], "size": [50.0, 1.0] }),
     )
     .unwrap();
-    let answer = model.posterior(&["task"], &evidence).unwrap();
+    let answer = model.query(&["task"], &evidence).unwrap();
     assert!(answer.log_evidence < -1000.0 && answer.log_evidence.is_finite());
-    assert!((answer.posterior("task").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!((answer.probabilities("task").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
 #[test]
 fn a_flat_component_is_legal_until_the_evidence_needs_its_density() {
     let flat = EXAMPLE.replace("[[0.5, 0.1], [0.1, 0.5]]", "[[0.5, 0.5], [0.5, 0.5]]");
     let model = Model::from_json(&flat).unwrap();
-    assert!(model.posterior(&["size"], &Evidence::new()).is_ok());
-    let error = model.posterior(
+    assert!(model.query(&["size"], &Evidence::new()).is_ok());
+    let error = model.query(
         &["task"],
         &Evidence::new().with_value(&model, "size", &[0.0, 0.0]).unwrap(),
     );
@@ -152,16 +153,16 @@ fn a_flat_component_is_legal_until_the_evidence_needs_its_density() {
     // One dimension of it has a density, and so has a noisy measurement.
     assert!(
         model
-            .posterior(
+            .query(
                 &["task"],
-                &Evidence::from_json(&model, &json!({ "size": [0.0, null] })).unwrap()
+                &evidence_of(&model, &json!({ "size": [0.0, null] })).unwrap()
             )
             .is_ok()
     );
     let noisy = json!({ "size": { "mean": [0.0, 0.0], "covariance": [[0.1, 0.0], [0.0, 0.1]] } });
     assert!(
         model
-            .posterior(&["task"], &Evidence::from_json(&model, &noisy).unwrap())
+            .query(&["task"], &evidence_of(&model, &noisy).unwrap())
             .is_ok()
     );
 }
@@ -169,13 +170,12 @@ fn a_flat_component_is_legal_until_the_evidence_needs_its_density() {
 #[test]
 fn contributions_add_up_to_the_posterior_odds() {
     let model = oracle_model();
-    let evidence =
-        Evidence::from_json(&model, &json!({ "size": [0.3, -0.2], "upos": [0.2, -0.5, 0.3] })).unwrap();
+    let evidence = evidence_of(&model, &json!({ "size": [0.3, -0.2], "upos": [0.2, -0.5, 0.3] })).unwrap();
     let explanation = model.explain("task", &evidence).unwrap();
     let posterior = model
-        .posterior(&["task"], &evidence)
+        .query(&["task"], &evidence)
         .unwrap()
-        .posterior("task")
+        .probabilities("task")
         .unwrap();
     let states = ["hand-over", "pouring", "tool-use"];
     let p = |state: &str| posterior[states.iter().position(|s| *s == state).unwrap()];
@@ -198,16 +198,16 @@ fn contributions_add_up_to_the_posterior_odds() {
 fn a_prior_can_be_replaced() {
     let model = example();
     let certain = model
-        .with_priors_json(&json!({ "task": { "pouring": 2.0 } }))
+        .with_priors_json(r#"{ "task": { "pouring": 2.0 } }"#)
         .unwrap();
-    let answer = certain.posterior(&["task"], &Evidence::new()).unwrap();
-    assert_eq!(answer.posterior("task").unwrap(), [0.0, 1.0]);
-    let uniform = model.with_priors_json(&json!("uniform")).unwrap();
+    let answer = certain.query(&["task"], &Evidence::new()).unwrap();
+    assert_eq!(answer.probabilities("task").unwrap(), [0.0, 1.0]);
+    let uniform = model.with_uniform_priors();
     assert_eq!(
         uniform
-            .posterior(&["task"], &Evidence::new())
+            .query(&["task"], &Evidence::new())
             .unwrap()
-            .posterior("task")
+            .probabilities("task")
             .unwrap(),
         [0.5, 0.5]
     );
@@ -216,7 +216,10 @@ fn a_prior_can_be_replaced() {
 #[test]
 fn json_and_bytes_lose_nothing() {
     for mut model in [example(), oracle_model()] {
-        model = model.with_extra("provenance", json!({ "seed": 7, "third": 1.0 / 3.0 }));
+        let provenance = json!({ "seed": 7, "third": 1.0 / 3.0 }).to_string();
+        model = model.with_extra("provenance", &provenance).unwrap();
+        assert_eq!(model.extra().get("provenance"), Some(provenance));
+        assert!(model.clone().with_extra("provenance", "{").is_err());
         let text = model.to_json();
         assert_eq!(Model::from_json(&text).unwrap(), model);
         let bytes = model.to_bytes();
@@ -272,7 +275,7 @@ fn a_wrong_model_file_says_where() {
 #[test]
 fn wrong_evidence_says_what_would_do() {
     let model = example();
-    let message = |json: Value| Evidence::from_json(&model, &json).unwrap_err().to_string();
+    let message = |json: Value| evidence_of(&model, &json).unwrap_err().to_string();
     assert_eq!(
         message(json!({ "colour": 1 })),
         "the model has no node `colour`; its nodes are `task`, `size`"
@@ -283,7 +286,7 @@ fn wrong_evidence_says_what_would_do() {
     );
     assert!(message(json!({ "size": [1.0] })).contains("expected 2 finite numbers or nulls"));
     assert!(message(json!({ "size": "big" })).contains("expected an array of 2 numbers or nulls"));
-    let twice = model.posterior(&["task", "task"], &Evidence::new()).unwrap_err();
+    let twice = model.query(&["task", "task"], &Evidence::new()).unwrap_err();
     assert_eq!(
         twice.to_string(),
         "`task`: found the same target twice, expected each target once"
@@ -324,19 +327,19 @@ fn shared_weights_are_checked_and_kept() {
 #[test]
 fn an_explanation_has_words_and_a_counterfactual() {
     let model = example();
-    let evidence = Evidence::from_json(&model, &json!({ "size": [2.0, 1.0] })).unwrap();
+    let evidence = evidence_of(&model, &json!({ "size": [2.0, 1.0] })).unwrap();
     let words = model.explain("task", &evidence).unwrap().words();
     assert_eq!(words.len(), 1);
     assert!(
         words[0].starts_with("`pouring` is ") && words[0].contains("size speaks for it (+"),
         "{words:?}"
     );
-    let changes = Evidence::from_json(&model, &json!({ "size": [0.1, 0.2] })).unwrap();
+    let changes = evidence_of(&model, &json!({ "size": [0.1, 0.2] })).unwrap();
     let other = model.counterfactual("task", &evidence, &changes).unwrap();
     let then = model
-        .posterior(&["task"], &changes)
+        .query(&["task"], &changes)
         .unwrap()
-        .posterior("task")
+        .probabilities("task")
         .unwrap();
     assert_eq!(other.states.iter().map(|s| s.2).collect::<Vec<_>>(), then);
     assert!(
@@ -349,11 +352,7 @@ fn an_explanation_has_words_and_a_counterfactual() {
 #[test]
 fn what_no_row_of_the_model_looks_like_is_a_surprise() {
     let model = oracle_model();
-    let score = |json: Value| {
-        model
-            .surprise(&Evidence::from_json(&model, &json).unwrap())
-            .unwrap()
-    };
+    let score = |json: Value| model.surprise(&evidence_of(&model, &json).unwrap()).unwrap();
     let strange = score(json!({ "size": [30.0, -30.0], "fvol": 0.2 }));
     assert_eq!(strange.tail, 1.0 / 1000.0);
     assert!(
@@ -395,7 +394,7 @@ fn the_likeliest_components_may_tell_another_story() {
             [{ "weight": 1.0, "mean": [1.0], "coefficients": [[2.0]], "covariance": [[0.5]] }]] }] }"#,
     )
     .unwrap();
-    let seen = Evidence::from_json(&model, &json!({ "x": 0.05 })).unwrap();
+    let seen = evidence_of(&model, &json!({ "x": 0.05 })).unwrap();
     let summed = model.most_probable(&seen, Latent::Summed).unwrap();
     let maximised = model.most_probable(&seen, Latent::Maximised).unwrap();
     assert_eq!(summed.states, [("kind".into(), "two".into())]);
@@ -421,8 +420,8 @@ fn a_long_chain_of_discrete_nodes_is_no_matter_of_its_joint_states() {
         Model::from_json(&json!({ "format": "prehend-model", "version": 1, "nodes": nodes }).to_string())
             .unwrap();
     let end = Evidence::new().with_state(&model, "n59", "b").unwrap();
-    let start = model.posterior(&["n0", "n30"], &end).unwrap();
-    assert!((start.posterior("n0").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    let start = model.query(&["n0", "n30"], &end).unwrap();
+    assert!((start.probabilities("n0").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
     // By hand: what 30 steps from the start make of the prior, times what 29 steps back make of the evidence.
     let step = [[0.8, 0.1, 0.1], [0.2, 0.6, 0.2], [0.1, 0.2, 0.7]];
     let (mut forward, mut backward) = ([0.2, 0.3, 0.5], [0.0, 1.0, 0.0]);
@@ -433,7 +432,7 @@ fn a_long_chain_of_discrete_nodes_is_no_matter_of_its_joint_states() {
         backward = step.map(|row| (0..3).map(|j| row[j] * backward[j]).sum());
     }
     let total: f64 = (0..3).map(|i| forward[i] * backward[i]).sum();
-    let middle = start.posterior("n30").unwrap();
+    let middle = start.probabilities("n30").unwrap();
     assert!(
         (0..3).all(|i| (middle[i] - forward[i] * backward[i] / total).abs() < 1e-12),
         "{middle:?}"

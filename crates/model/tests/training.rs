@@ -3,7 +3,7 @@
 mod common;
 
 use common::{fit, held_out, network, truth};
-use prehend_model::{Evidence, Network, Table, TrainOptions, Trained, train};
+use prehend_model::{Evidence, Model, Network, Table, TrainOptions, Trained};
 
 /// Up to five components, by BIC.
 fn by_bic() -> String {
@@ -85,7 +85,7 @@ fn repeated() -> Table {
 #[test]
 fn a_node_that_is_constant_within_objects_gets_no_component_per_object() {
     let network = Network::from_toml(&format!("group = \"object\"\n{}", by_bic())).unwrap();
-    let report = train(&network, &repeated(), &TrainOptions::default())
+    let report = Model::fit(&network, &repeated(), &TrainOptions::default())
         .unwrap()
         .report;
     let size = &report.nodes[1];
@@ -109,11 +109,11 @@ fn a_node_that_is_constant_within_objects_gets_no_component_per_object() {
 fn cross_validation_over_objects_never_takes_more_components_than_bic() {
     let guarded = by_bic().replace("\"bic\"", "\"bic+cv\"");
     let network = Network::from_toml(&format!("group = \"object\"\n{guarded}")).unwrap();
-    let report = train(&network, &repeated(), &TrainOptions::default())
+    let report = Model::fit(&network, &repeated(), &TrainOptions::default())
         .unwrap()
         .report;
     let alone = Network::from_toml(&format!("group = \"object\"\n{}", by_bic())).unwrap();
-    let by_bic = train(&alone, &repeated(), &TrainOptions::default())
+    let by_bic = Model::fit(&alone, &repeated(), &TrainOptions::default())
         .unwrap()
         .report;
     for (node, free) in report.nodes.iter().zip(&by_bic.nodes) {
@@ -149,11 +149,11 @@ fn gaps_a_constant_column_one_row_and_a_task_that_never_occurs_are_survived() {
             .any(|w| w.starts_with("`size` given task=b: 0 rows are too few"))
     );
     let evidence = Evidence::new().with_value(&model, "size", &[0.2, 1.0]).unwrap();
-    let answer = model.posterior(&["task"], &evidence).unwrap();
-    assert!((answer.posterior("task").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    let answer = model.query(&["task"], &evidence).unwrap();
+    assert!((answer.probabilities("task").unwrap().iter().sum::<f64>() - 1.0).abs() < 1e-12);
     let one = trained(&table.select(&[0]));
     assert_eq!(one.report.nodes[2].n_rows, 1);
-    let none = train(
+    let none = Model::fit(
         &Network::from_toml(&by_bic()).unwrap(),
         &table.select(&[]),
         &TrainOptions::default(),
@@ -167,7 +167,7 @@ fn gaps_a_constant_column_one_row_and_a_task_that_never_occurs_are_survived() {
 #[test]
 fn a_missing_column_is_named() {
     let table = Table::new(1).with_numbers("size_x", vec![0.0]).unwrap();
-    let error = train(
+    let error = Model::fit(
         &Network::from_toml(&by_bic()).unwrap(),
         &table,
         &TrainOptions::default(),
@@ -186,7 +186,7 @@ fn shared_components_differ_in_weights_only() {
         "parents = [\"task\"]\nweights = \"shared\"\n",
     );
     let table = truth().sample(2000, 8);
-    let trained = train(
+    let trained = Model::fit(
         &Network::from_toml(&shared).unwrap(),
         &table,
         &TrainOptions::default(),

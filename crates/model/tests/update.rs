@@ -1,8 +1,6 @@
 //! Learning goes on with new rows, without the old ones; and what the rows leave open is kept.
 
-use prehend_model::{
-    Cpd, Ensemble, Evidence, Model, ModelError, Network, Table, TrainOptions, Trained, train,
-};
+use prehend_model::{Cpd, Ensemble, Evidence, Model, ModelError, Network, Table, TrainOptions, Trained};
 
 const TRUTH: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
   { "name": "task", "kind": "discrete", "states": ["a", "b"], "table": [[0.4, 0.6]] },
@@ -35,7 +33,7 @@ fn truth() -> Model {
 }
 
 fn fit(network: &Network, table: &Table) -> Trained {
-    train(network, table, &TrainOptions::default()).unwrap()
+    Model::fit(network, table, &TrainOptions::default()).unwrap()
 }
 
 /// The rows of a range.
@@ -194,11 +192,11 @@ fn few_rows_leave_much_open_and_many_leave_little() {
     let width = |n: usize| {
         let model = fit(&network, &truth().sample(n, 7)).model;
         let ensemble = Ensemble::drawn(&model, 40, 1).unwrap();
-        let answer = ensemble.posterior(&["task"], &evidence(&model)).unwrap();
-        let sum: f64 = answer.mean.posterior("task").unwrap().iter().sum();
+        let answer = ensemble.query(&["task"], &evidence(&model)).unwrap();
+        let sum: f64 = answer.mean.probabilities("task").unwrap().iter().sum();
         assert!((sum - 1.0).abs() < 1e-9);
         let (low, high) = answer.interval("task", 0.9).unwrap()[0];
-        let mean = answer.mean.posterior("task").unwrap()[0];
+        let mean = answer.mean.probabilities("task").unwrap()[0];
         assert!(low <= mean && mean <= high);
         high - low
     };
@@ -217,7 +215,7 @@ fn averaged_over_draws_a_gaussian_is_students_t() {
     let model = fit(&Network::from_toml(one).unwrap(), &table).model;
     let answer = Ensemble::drawn(&model, 20_000, 1)
         .unwrap()
-        .posterior(&["x"], &Evidence::new())
+        .query(&["x"], &Evidence::new())
         .unwrap();
     let mixture = answer.mean.mixture("x").unwrap();
     let mean = values.iter().sum::<f64>() / 10.0;

@@ -82,9 +82,9 @@ pub fn plan(
     let trained_on = model
         .extra()
         .get("provenance")
-        .and_then(|p| p.get("hand"))
-        .and_then(|h| h.as_str());
-    if let Some(other) = trained_on.filter(|name| *name != hand.name()) {
+        .and_then(|json| serde_json::from_str::<serde_json::Value>(&json).ok())
+        .and_then(|provenance| Some(provenance.get("hand")?.as_str()?.to_owned()));
+    if let Some(other) = trained_on.filter(|name| name != hand.name()) {
         watch.progress.warn(&format!(
             "the model was trained on grasps of {other}, not of {}; its probabilities may mislead",
             hand.name()

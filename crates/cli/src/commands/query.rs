@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use prehend::frame::Frame;
-use prehend::model::{Cpd, Ensemble, EnsembleAnswer, Evidence, Latent, Model, ModelError, Target};
+use prehend::model::{Cpd, Ensemble, EnsemblePosterior, Evidence, Latent, Model, ModelError, Target};
 use prehend::training::to_table;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -137,7 +137,7 @@ impl Arguments {
             let run = |line: Value| {
                 let question: Question =
                     serde_json::from_value(line).context("expected evidence, target and at")?;
-                let evidence = Evidence::from_json(&model, &or_empty(question.evidence))?;
+                let evidence = Evidence::from_json(&model, &or_empty(&question.evidence))?;
                 let targets = match question.target {
                     Some(Targets::One(name)) => name.split(',').map(str::to_owned).collect(),
                     Some(Targets::Several(names)) => names,
@@ -165,7 +165,7 @@ impl Arguments {
             Some(text) => {
                 let value: Value = serde_json::from_str(text)
                     .map_err(|e| Usage(format!("--evidence: {e}; expected '{{\"NODE\": value}}'")))?;
-                Evidence::from_json(&model, &value)?
+                Evidence::from_json(&model, &value.to_string())?
             }
             None => Evidence::new(),
         };
@@ -209,27 +209,28 @@ impl Arguments {
         } else {
             let names: Vec<&str> = targets.iter().map(String::as_str).collect();
             match names[..] {
-                [name] if matches!(model.node(model.index(name)?).cpd, Cpd::VonMisesFisher(_)) => {
-                    model.direction_posterior(name, evidence)?.to_json_at(at)?
-                }
+                [name] if matches!(model.node(model.index(name)?).cpd, Cpd::VonMisesFisher(_)) => model
+                    .query_direction(name, evidence)?
+                    .to_json_at(at)
+                    .map(|text| parsed(&text))?,
                 _ => {
                     let all = ensemble
-                        .map(|ensemble| ensemble.posterior(&names, evidence))
+                        .map(|ensemble| ensemble.query(&names, evidence))
                         .transpose()?;
                     let posterior = match &all {
                         Some(all) => all.mean.clone(),
-                        None => model.posterior(&names, evidence)?,
+                        None => model.query(&names, evidence)?,
                     };
-                    let mut answer = posterior.to_json_at(at)?;
+                    let mut answer = parsed(&posterior.to_json_at(at)?);
                     if let Some(all) = &all {
                         answer["interval"] = interval(all);
                     }
                     if self.samples > 0 {
-                        answer["samples"] = posterior.samples_json(self.samples, self.seed);
+                        answer["samples"] = parsed(&posterior.samples_json(self.samples, self.seed));
                     }
                     if self.modes {
                         let modes = posterior.modes_json();
-                        answer["modes"] = modes.map_err(|e| anyhow::anyhow!("--modes: {e}"))?;
+                        answer["modes"] = parsed(&modes.map_err(|e| anyhow::anyhow!("--modes: {e}"))?);
                     }
                     answer
                 }
@@ -239,8 +240,8 @@ impl Arguments {
             let [target] = targets else {
                 bail!(Usage("--explain needs exactly one --target".into()))
             };
-            answer["explanation"] = model.explain(target, evidence)?.to_json();
-            answer["surprise"] = model.surprise(evidence)?.to_json();
+            answer["explanation"] = parsed(&model.explain(target, evidence)?.to_json());
+            answer["surprise"] = parsed(&model.surprise(evidence)?.to_json());
         }
         if let Some(text) = &self.counterfactual {
             let [target] = targets else {
@@ -248,8 +249,8 @@ impl Arguments {
             };
             let value: Value = serde_json::from_str(text)
                 .map_err(|e| Usage(format!("--counterfactual: {e}; expected '{{\"NODE\": value}}'")))?;
-            let changes = Evidence::from_json(model, &value)?;
-            answer["counterfactual"] = model.counterfactual(target, evidence, &changes)?.to_json();
+            let changes = Evidence::from_json(model, &value.to_string())?;
+            answer["counterfactual"] = parsed(&model.counterfactual(target, evidence, &changes)?.to_json());
         }
         if self.mpe {
             let latent = if self.mpe_components {
@@ -257,14 +258,14 @@ impl Arguments {
             } else {
                 Latent::Summed
             };
-            answer["mpe"] = model.most_probable(evidence, latent)?.to_json();
+            answer["mpe"] = parsed(&model.most_probable(evidence, latent)?.to_json());
         }
         Ok(answer)
     }
 }
 
 /// Where nine tenths of the members' probabilities lie: `{NODE: {STATE: [low, high]}}`.
-fn interval(answer: &EnsembleAnswer) -> Value {
+fn interval(answer: &EnsemblePosterior) -> Value {
     let of_target = |target: &Target| match target {
         Target::Continuous { .. } => None,
         Target::Discrete { name, states } => {
@@ -276,8 +277,17 @@ fn interval(answer: &EnsembleAnswer) -> Value {
     Value::Object(answer.mean.targets.iter().filter_map(of_target).collect())
 }
 
-fn or_empty(value: Value) -> Value {
-    if value.is_null() { json!({}) } else { value }
+fn or_empty(value: &Value) -> String {
+    if value.is_null() {
+        "{}".into()
+    } else {
+        value.to_string()
+    }
+}
+
+/// Our own text, to be joined with others.
+fn parsed(json: &str) -> Value {
+    serde_json::from_str(json).unwrap_or_default()
 }
 
 /// The weights that `--prior` gives to a node's states, scaled to sum 1; a state left out has 0.

@@ -74,7 +74,7 @@ impl Arguments {
         let n_rows = rows.n_rows();
         drop(rows);
         let trained = match &start {
-            Start::Network(network) => prehend::model::train(&network.network, &table, &options),
+            Start::Network(network) => Model::fit(&network.network, &table, &options),
             Start::Model(_, model) => model.update(&table, &options),
         };
         let Trained { model, report } = trained.map_err(|e| self.rows.blame(e))?;
@@ -100,7 +100,7 @@ impl Arguments {
             });
             write_model(
                 &out.join(start.name()),
-                &model.with_extra("provenance", provenance),
+                &model.with_extra("provenance", &provenance.to_string())?,
             )?;
         }
         output::answer(json, &answer, text)?;

@@ -11,6 +11,7 @@ mod xmlbif;
 
 use crate::cpd::{Cpd, DiscreteCpd, NodeIdx};
 use crate::error::{ModelError, list};
+use crate::extra::Extra;
 use crate::model::{Model, Node};
 
 /// A model as text in another program's format.
@@ -127,10 +128,10 @@ fn discrete_model(format: &'static str, nodes: Vec<Foreign>) -> Result<Model, Mo
                 parents,
                 table,
             }),
-            extra: serde_json::Map::new(),
+            extra: Extra::default(),
         });
     }
-    Model::new(out, serde_json::Map::new())
+    Model::new(out, Extra::default())
 }
 
 /// Positions of the named parents.

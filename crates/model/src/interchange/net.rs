@@ -9,6 +9,7 @@ use super::names::legal_names;
 use super::{At, Export, distribution, find, n_configurations};
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, Sign, Weights};
 use crate::error::ModelError;
+use crate::extra::Extra;
 use crate::model::{Model, Node};
 
 const STYLE: Style = Style {
@@ -437,8 +438,8 @@ fn build(nodes: Vec<Declared>) -> Result<Model, ModelError> {
         out.push(Node {
             name: node.name,
             cpd,
-            extra: serde_json::Map::new(),
+            extra: Extra::default(),
         });
     }
-    Model::new(out, serde_json::Map::new())
+    Model::new(out, Extra::default())
 }

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::cpd::{Component, Cpd, DiscreteCpd, MixtureCpd, NodeIdx, Sign, Weights};
 use crate::error::ModelError;
+use crate::extra::Extra;
 use crate::model::{Model, Node};
 
 impl Model {
@@ -84,7 +85,7 @@ impl Model {
                 }
             }
         }
-        let model = Self::new(nodes, serde_json::Map::new())?;
+        let model = Self::new(nodes, Extra::default())?;
         Ok((model, notes))
     }
 }
@@ -93,7 +94,7 @@ fn plain(name: &str, cpd: Cpd) -> Node {
     Node {
         name: name.into(),
         cpd,
-        extra: serde_json::Map::new(),
+        extra: Extra::default(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! A small mixed network that the tests of learning share.
 
-use prehend_model::{Model, Network, Table, TrainOptions, Trained, train};
+use prehend_model::{Model, Network, Table, TrainOptions, Trained};
 
 /// Two tasks, a size with one or two clusters, and a grip that regresses on it.
 const TRUTH: &str = r#"{ "format": "prehend-model", "version": 1, "nodes": [
@@ -46,7 +46,7 @@ pub fn truth() -> Model {
 
 /// Training with the default settings.
 pub fn fit(network: &str, table: &Table) -> Trained {
-    train(
+    Model::fit(
         &Network::from_toml(network).unwrap(),
         table,
         &TrainOptions::default(),

@@ -205,7 +205,7 @@ fn task_maps(
                 .with_value(model, "size", &features.size)?
                 .with_value(model, "cvex", &[features.cvex])?;
             let mixture = model
-                .posterior(&["upos"], &evidence)?
+                .query(&["upos"], &evidence)?
                 .mixture("upos")
                 .ok_or_else(|| Error::input("the network has no continuous node `upos`"))?;
             let log_density =

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use prehend_model::{Model, Network, TrainOptions, train};
+use prehend_model::{Model, Network, TrainOptions};
 use prehend_report::NodeTraining;
 use prehend_tutor::label_ceiling;
 use serde_json::{Value, json};
@@ -265,7 +265,7 @@ impl Trainer {
             group: Some("object".into()),
             ..TrainOptions::default()
         };
-        let trained = train(&network.network, &to_table(&balanced)?, &options)?;
+        let trained = Model::fit(&network.network, &to_table(&balanced)?, &options)?;
         let provenance = json!({
             "fingerprint": fingerprint,
             "hand": dataset.hand,
@@ -278,8 +278,8 @@ impl Trainer {
         let report = serde_json::to_value(&trained.report).map_err(Error::input)?;
         let model = trained
             .model
-            .with_extra("provenance", provenance)
-            .with_extra("training", report.clone());
+            .with_extra("provenance", &provenance.to_string())?
+            .with_extra("training", &report.to_string())?;
         write_model(&base, &model)?;
         Ok(Trained { model, rows, report })
     }
@@ -321,12 +321,12 @@ impl Trainer {
 fn read_known(base: &Path, fingerprint: &str) -> Option<Trained> {
     let bytes = files::read(&base.with_extension("bin")).ok()?;
     let model = Model::from_bytes(&bytes).ok()?;
-    let provenance = model.extra().get("provenance")?;
+    let provenance: Value = serde_json::from_str(&model.extra().get("provenance")?).ok()?;
     if provenance.get("fingerprint")?.as_str()? != fingerprint {
         return None;
     }
     let rows = serde_json::from_value(provenance.get("rows")?.clone()).ok()?;
-    let report = model.extra().get("training")?.clone();
+    let report = serde_json::from_str(&model.extra().get("training")?).ok()?;
     Some(Trained { model, rows, report })
 }
 
