@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use prehend::model::{Network, Table, TrainOptions};
+use prehend::model::{Model, Network, Table, TrainOptions};
 use prehend_benches::paper_network::{network, truth, with_gaps};
 
 const ROWS: usize = 3600;

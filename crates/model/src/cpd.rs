@@ -301,9 +301,9 @@ mod tests {
         assert_eq!(cpd.n_parameters(), 2 * 7 + 3);
         cpd.weights = Weights::Root;
         assert_eq!(cpd.n_parameters(), 6 * 7 + 1);
-        cpd.components
-            .iter_mut()
-            .for_each(|row| row[1] = component(0.6, 1.0));
+        for row in &mut cpd.components {
+            row[1] = component(0.6, 1.0);
+        }
         assert_eq!(cpd.n_parameters(), 6 * 4 + 3 + 1);
     }
 

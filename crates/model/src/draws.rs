@@ -18,6 +18,7 @@ use crate::assemble::assemble;
 use crate::cell::settings;
 use crate::cpd::{Cpd, Scaling, Weights};
 use crate::error::ModelError;
+use crate::extra::Extra;
 use crate::gaussian::{semidefinite_root, solve_lower, solve_lower_transpose, symmetrize};
 use crate::model::Model;
 use crate::moments::{Mixing, Moment, Regression, Settings, clip, pool, regress};
@@ -48,13 +49,13 @@ impl Model {
                 rng.set_stream(number);
                 let mut nodes = self.nodes().to_vec();
                 for (i, node) in nodes.iter_mut().enumerate() {
-                    node.extra.clear();
+                    node.extra = Extra::default();
                     let Some(kept) = statistics.nodes.get(&node.name) else {
                         continue;
                     };
                     draw_node(&network, i, kept, &cells[i], &units, &mut node.cpd, &mut rng);
                 }
-                Self::new(nodes, crate::extra::Extra::default())
+                Self::new(nodes, Extra::default())
             })
             .collect()
     }

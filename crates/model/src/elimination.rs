@@ -38,7 +38,7 @@ pub(crate) struct Elimination<'a> {
     pub blocks: Vec<Block>,
     pub latent: Latent,
     /// Most combinations that a block keeps at each step, where all would be too many.
-    width: Option<usize>,
+    pub width: Option<usize>,
 }
 
 /// Hidden continuous nodes and the observed children they reach, parents first.

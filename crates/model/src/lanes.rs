@@ -57,6 +57,10 @@ pub(crate) fn exp(x: Lanes) -> Lanes {
 
 /// |r|².
 #[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "unrolled where the dimension is known when compiling"
+)]
 pub(crate) fn norm_squared(residual: &[Lanes]) -> Lanes {
     let mut square = [0.0; LANES];
     for row in residual {
@@ -69,6 +73,10 @@ pub(crate) fn norm_squared(residual: &[Lanes]) -> Lanes {
 
 /// |L r|², L a lower triangle given row by row.
 #[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "unrolled where the dimension is known when compiling"
+)]
 pub(crate) fn norm_of_product(lower: &[f64], residual: &[Lanes]) -> Lanes {
     let mut square = [0.0; LANES];
     let mut start = 0;

@@ -22,7 +22,7 @@
 //!     parents = ["task"]
 //!     mixture = { components = 1 }"#)?;
 //! let rows = Table::new(8)
-//!     .with("task", Column::Texts(["pour", "pour", "pour", "pour", "use", "use", "use", "use"].map(String::from).to_vec()))?
+//!     .with("task", Column::Text(["pour", "pour", "pour", "pour", "use", "use", "use", "use"].map(String::from).to_vec()))?
 //!     .with_numbers("width", vec![0.08, 0.07, 0.09, 0.08, 0.03, 0.02, 0.03, 0.04])?;
 //! let model = Model::fit(&network, &rows, &TrainOptions::default())?.model;
 //! # assert_eq!(model.nodes().len(), 2);

@@ -173,6 +173,10 @@ impl Mixture {
 
     /// Log densities at several points, coordinate by coordinate.
     #[inline(always)]
+    #[expect(
+        clippy::inline_always,
+        reason = "unrolled where the dimension is known when compiling"
+    )]
     fn log_sums(&self, d: usize, factors: &[&Factor], x: &[Lanes]) -> Lanes {
         let mut sums = LogSums::default();
         let mut away = vec![[0.0; LANES]; d];

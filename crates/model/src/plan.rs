@@ -132,17 +132,16 @@ impl Plan {
                 let number = match known_factors.entry(key) {
                     Entry::Occupied(known) => *known.get(),
                     Entry::Vacant(vacant) => {
-                        fast.factors
-                            .push(match (&model.node(nodes[0]).cpd, place[nodes[0].0]) {
-                                (Cpd::VonMisesFisher(cpd), Some(start)) => {
-                                    let configuration = model.configuration(nodes[0], &states);
-                                    Tree::of_directions(&cpd.components[configuration], start, width)
-                                }
-                                _ => {
-                                    let (steps, _) = block::steps(model, nodes, &states, width + 1, &known);
-                                    Tree::grow(&steps)?
-                                }
-                            });
+                        let factor = if let (Cpd::VonMisesFisher(cpd), Some(start)) =
+                            (&model.node(nodes[0]).cpd, place[nodes[0].0])
+                        {
+                            let configuration = model.configuration(nodes[0], &states);
+                            Tree::of_directions(&cpd.components[configuration], start, width)
+                        } else {
+                            let (steps, _) = block::steps(model, nodes, &states, width + 1, &known);
+                            Tree::grow(&steps)?
+                        };
+                        fast.factors.push(factor);
                         *vacant.insert(fast.factors.len() - 1)
                     }
                 };

@@ -305,3 +305,77 @@ fn arrange(query: &Elimination, mut terms: Vec<Term>, log_evidence: f64, error_b
     }
     Posterior::new(log_evidence, targets, terms, error_bound)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of hidden nodes with four components each, observed at its end and asked about at its start.
+    fn chain(seed: u64) -> (Model, Evidence) {
+        let spread = |i: u64| ((seed * 31 + i * 17) % 23) as f64 / 5.0 - 2.0;
+        let component = |i: u64, q: usize| {
+            let slope = if q == 0 {
+                String::new()
+            } else {
+                (0.6 + 0.1 * spread(i + 3)).to_string()
+            };
+            format!(
+                r#"{{ "weight": {}, "mean": [{}], "coefficients": [[{slope}]], "covariance": [[{}]] }}"#,
+                [0.1, 0.2, 0.3, 0.4][(i % 4) as usize],
+                2.0 * spread(i),
+                0.05 + 0.1 * spread(i + 5).abs()
+            )
+        };
+        let row = |start: u64, q: usize| {
+            let row: Vec<String> = (start..start + 4).map(|i| component(i, q)).collect();
+            format!("[{}]", row.join(","))
+        };
+        let text = format!(
+            r#"{{ "format": "prehend-model", "version": 1, "nodes": [
+            {{ "name": "t", "kind": "discrete", "states": ["a", "b"], "table": [[0.3, 0.7]] }},
+            {{ "name": "x", "kind": "gaussian_mixture", "discrete_parents": ["t"], "components": [{}, {}] }},
+            {{ "name": "y", "kind": "gaussian_mixture", "continuous_parents": ["x"], "components": [{}] }},
+            {{ "name": "z", "kind": "gaussian_mixture", "continuous_parents": ["y"], "components": [{}] }},
+            {{ "name": "w", "kind": "gaussian_mixture", "continuous_parents": ["z"], "components": [{}] }}] }}"#,
+            row(0, 0),
+            row(4, 0),
+            row(8, 1),
+            row(12, 1),
+            row(16, 1)
+        );
+        let model = Model::from_json(&text).unwrap();
+        let evidence = Evidence::new().with_value(&model, "w", &[spread(7)]).unwrap();
+        (model, evidence)
+    }
+
+    #[test]
+    fn what_was_left_out_is_within_the_bound() {
+        let mut n_useful = 0;
+        for seed in 0..20 {
+            let (model, evidence) = chain(seed);
+            for target in ["t", "x"] {
+                let asked = [model.index(target).unwrap()];
+                let exact = model.query(&[target], &evidence).unwrap();
+                assert_eq!(exact.error_bound, 0.0);
+                for width in [1, 4, 16, 64, 200] {
+                    let mut elimination = Elimination::new(&model, &asked, &evidence, Latent::Summed);
+                    elimination.width = Some(width);
+                    let found = run(&elimination).unwrap();
+                    assert!((0.0..=1.0).contains(&found.error_bound));
+                    let most = found.log_evidence - (-found.error_bound).ln_1p();
+                    assert!(found.log_evidence <= exact.log_evidence + 1e-9);
+                    assert!(exact.log_evidence <= most + 1e-9, "{seed} {target} {width}");
+                    n_useful += usize::from(found.error_bound > 0.0 && found.error_bound < 0.5);
+                    let Some(expected) = exact.probabilities("t") else {
+                        continue;
+                    };
+                    let pairs = found.probabilities("t").unwrap().into_iter().zip(expected);
+                    for (found_p, p) in pairs {
+                        assert!((found_p - p).abs() <= found.error_bound + 1e-9, "{seed} {width}");
+                    }
+                }
+            }
+        }
+        assert!(n_useful > 10, "{n_useful} bounds say something");
+    }
+}

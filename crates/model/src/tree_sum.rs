@@ -76,6 +76,10 @@ impl Tree {
 
     #[inline(always)]
     #[expect(
+        clippy::inline_always,
+        reason = "unrolled where the dimension is known when compiling"
+    )]
+    #[expect(
         clippy::too_many_arguments,
         reason = "`dim` stands apart so that it can be known when compiling"
     )]

@@ -238,6 +238,5 @@ fn weights(n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
         out[0] = 1.0;
         return out;
     }
-    out.iter_mut().for_each(|w| *w /= sum);
-    out
+    out.into_iter().map(|w| w / sum).collect()
 }
