@@ -183,8 +183,8 @@ fn chance(model: &Model, task_idx: usize, object: &GraspObject, proposal: &Propo
         qeps: 0.0,
     };
     let evidence = evidence(model, &features, &["size", "cvex", "egpc", "upos", "dir"]).ok()?;
-    let answer = model.posterior(&["task"], &evidence).ok()?;
-    answer.posterior("task")?.get(task_idx).copied()
+    let answer = model.query(&["task"], &evidence).ok()?;
+    answer.probabilities("task")?.get(task_idx).copied()
 }
 
 /// A number in [0, 1) that every proposal has for itself: the draw does not depend on threads.
