@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use prehend::grasp::{CloseOptions, GraspObject, ReadyHand};
+use prehend::grasp::{CloseOptions, GraspObject, ReadyHand, Reason};
 use prehend::grasp_table::ContactRecord;
 use prehend::hand::Hand;
 use prehend::stages::decompose::shape_of;
@@ -108,6 +108,6 @@ fn closed(
         "fvol_union": closed.free_volume.fvol_union,
         "penetration": closed.penetration,
         "reason": closed.reason.map(|r| r.to_string()),
-        "hint": closed.reason.map(|r| r.hint()),
+        "hint": closed.reason.map(Reason::hint),
     }))
 }
