@@ -22,7 +22,8 @@ pub(crate) fn descend(
     goal: &Goal,
     least: &mut Least,
 ) {
-    if space.n_axes() < 6 {
+    // Few facets are nearer than a bound that is small and enough.
+    if space.n_axes() < 6 || goal.enough < 0.5 * least.reach {
         return;
     }
     let planes: [Hyperplane<6>; 7] = std::array::from_fn(|place| frontier.plane(place));
@@ -35,13 +36,8 @@ pub(crate) fn descend(
         planes[1].normal,
         planes[2].normal,
     ];
-    // Where some bound is enough, few facets are nearer than that.
-    let n_starts = if goal.enough < f64::INFINITY {
-        1
-    } else {
-        starts.len()
-    };
-    for start in starts.into_iter().take(n_starts) {
+    let mut cones = [None; 7];
+    for start in starts {
         let mut here = Least {
             reach: f64::INFINITY,
             direction: start,
@@ -49,8 +45,19 @@ pub(crate) fn descend(
         for _ in 0..RAYS {
             let before = here.reach;
             let ray = here.direction;
-            let left = leave(space, simplex, &planes, &ray, goal.tolerance, &mut here);
-            if !left || here.reach >= before * (1.0 - 1e-9) {
+            let hit = hit(&planes, &ray);
+            if cones[hit].is_none() {
+                cones[hit] = inverse_without(simplex, hit);
+            }
+            let Some(cone) = cones[hit] else {
+                break;
+            };
+            let Some(cone) = leave(space, cone, &ray, goal.tolerance, &mut here) else {
+                break;
+            };
+            // Where the cone of the facet's corners holds its normal, the next ray would leave there again.
+            let settled = cone.iter().all(|row| dot(row, &here.direction) >= 0.0);
+            if settled || here.reach >= before * (1.0 - 1e-9) {
                 break;
             }
         }
@@ -64,15 +71,8 @@ pub(crate) fn descend(
 /// Rays from one start; later ones gain little.
 const RAYS: usize = 4;
 
-/// Finds the facet that the ray leaves through; false where that takes too long.
-fn leave(
-    space: &GraspWrenchSpace,
-    simplex: &[[f64; 6]; 7],
-    planes: &[Hyperplane<6>; 7],
-    ray: &[f64; 6],
-    tolerance: f64,
-    least: &mut Least,
-) -> bool {
+/// The facet of the simplex that the ray leaves through.
+fn hit(planes: &[Hyperplane<6>; 7], ray: &[f64; 6]) -> usize {
     let mut hit = (0, f64::NEG_INFINITY);
     for (i, plane) in planes.iter().enumerate() {
         let steepness = dot(&plane.normal, ray) / plane.offset;
@@ -80,9 +80,18 @@ fn leave(
             hit = (i, steepness);
         }
     }
-    let Some(mut inverse) = inverse_without(simplex, hit.0) else {
-        return false;
-    };
+    hit.0
+}
+
+/// Finds the facet that the ray leaves through, from six corners whose cone holds the ray; none where that takes too
+/// long. Cones are inverses of matrices whose columns are the corners.
+fn leave(
+    space: &GraspWrenchSpace,
+    mut inverse: [[f64; 6]; 6],
+    ray: &[f64; 6],
+    tolerance: f64,
+    least: &mut Least,
+) -> Option<[[f64; 6]; 6]> {
     // Enough for any space of contacts; a bound, since rounding could turn in circles.
     for _ in 0..60 {
         let polar: [f64; 6] = std::array::from_fn(|k| inverse.iter().map(|r| r[k]).sum());
@@ -91,7 +100,7 @@ fn leave(
         let (reach, point) = space.scaled_support(&direction);
         least.see(reach, &direction);
         if reach - 1.0 / length <= tolerance {
-            return true;
+            return Some(inverse);
         }
         let mut leaving = (0, f64::INFINITY, 0.0);
         let shares = inverse.map(|row| (dot(&row, ray), dot(&row, &point)));
@@ -102,7 +111,7 @@ fn leave(
         }
         let (j, _, pivot) = leaving;
         if pivot == 0.0 {
-            return false;
+            return None;
         }
         let taken = inverse[j].map(|c| c / pivot);
         for (row, (_, of_point)) in inverse.iter_mut().zip(shares) {
@@ -112,7 +121,7 @@ fn leave(
         }
         inverse[j] = taken;
     }
-    false
+    None
 }
 
 /// Inverse of the matrix whose columns are the simplex's corners but one.
