@@ -116,7 +116,7 @@ fn distance(c: &mut Criterion) {
             }
             group.bench_function("grid", |b| b.iter(|| surface.gap_bounds(&collider, &pose())));
             group.bench_function("tree", |b| {
-                b.iter(|| surface.gap(&collider, &pose(), f64::INFINITY))
+                b.iter(|| surface.gap(&collider, &pose(), f64::INFINITY));
             });
             group.bench_function("tree_below_2.5_mm", |b| {
                 b.iter(|| surface.gap(&collider, &pose(), 0.0025));
