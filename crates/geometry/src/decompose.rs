@@ -238,7 +238,8 @@ pub fn decompose(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposi
 /// Wraps points without a surface in boxes: [`decompose`] for a cloud.
 ///
 /// All is as there, with images and boxes of points in the place of images and boxes of triangles. The boxes together
-/// hold every point, and nothing is known of what lies between points: a cut may pass through any gap, and a scan of one
+/// hold every point, and nothing is known of what lies between points: a cut may pass through any gap (so points must be
+/// close beside the body's thickness), and a scan of one
 /// side of a body is the thin shell that it is. A cut leaves at least 20 points on either side, so few stray points
 /// get no boxes of their own but stretch those of others: filter a scan first. The more points, the closer the boxes come
 /// to those of the surface they lie on; duplicates change nothing but this count.
@@ -254,10 +255,10 @@ pub fn decompose(mesh: &TriMesh, options: &DecomposeOptions) -> Result<Decomposi
 /// use nalgebra::Point3;
 /// use prehend_geometry::{DecomposeOptions, decompose_points};
 ///
-/// // Two bars that form an L, 40 mm wide and 160 mm long, as points 10 mm apart.
-/// let bar = |i: i32, j: i32| Point3::new(f64::from(i), f64::from(j), 0.0) / 100.0;
-/// let points: Vec<Point3<f64>> = (0..=16)
-///     .flat_map(|i| (0..=4).flat_map(move |j| [bar(i, j), bar(j, i)]))
+/// // Two bars that form an L, 40 mm wide and 160 mm long, as points 2.5 mm apart.
+/// let bar = |i: i32, j: i32| Point3::new(f64::from(i), f64::from(j), 0.0) / 400.0;
+/// let points: Vec<Point3<f64>> = (0..=64)
+///     .flat_map(|i| (0..=16).flat_map(move |j| [bar(i, j), bar(j, i)]))
 ///     .collect();
 /// let found = decompose_points(&points, &DecomposeOptions::default())?;
 /// assert_eq!(found.boxes.len(), 2);
