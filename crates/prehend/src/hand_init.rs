@@ -210,19 +210,22 @@ fn with_visuals_as_collisions(urdf: &str) -> String {
     let mut out = String::with_capacity(2 * urdf.len());
     let mut rest = urdf;
     while let Some(start) = rest.find("<visual") {
-        let Some(end) = rest[start..]
-            .find("</visual>")
-            .map(|e| start + e + "</visual>".len())
-        else {
-            break;
+        let after = &rest[start + "<visual".len()..];
+        let closes_at_once = after.find('>').is_some_and(|end| after[..end].ends_with('/'));
+        let end = if starts_tag(after) && !closes_at_once {
+            after.find("</visual>")
+        } else {
+            None
         };
-        let (element, after) = (&rest[start..end], &rest[end..]);
-        out += &rest[..end];
-        if starts_tag(&element["<visual".len()..]) {
-            let inside = &element["<visual".len()..element.len() - "</visual>".len()];
+        let (copied, inside) = match end {
+            Some(end) => (start + "<visual".len() + end + "</visual>".len(), &after[..end]),
+            None => (start + "<visual".len(), ""),
+        };
+        out += &rest[..copied];
+        if !inside.is_empty() {
             out += &format!("\n    <collision{inside}</collision>");
         }
-        rest = after;
+        rest = &rest[copied..];
     }
     out + rest
 }
@@ -258,13 +261,12 @@ mod tests {
 
     #[test]
     fn pictures_become_shapes_where_there_are_no_others() {
-        let urdf =
-            "<link><visual><geometry/></visual></link><visuals/><link><visual name=\"b\">x</visual></link>";
+        let urdf = "<link><visual><geometry/></visual></link><visuals/><link><visual/><visual name=\"b\">x</visual></link>";
         assert!(!has_element(urdf, "collision") && has_element(urdf, "visual"));
         assert_eq!(
             with_visuals_as_collisions(urdf),
             "<link><visual><geometry/></visual>\n    <collision><geometry/></collision></link><visuals/><link>\
-             <visual name=\"b\">x</visual>\n    <collision name=\"b\">x</collision></link>"
+             <visual/><visual name=\"b\">x</visual>\n    <collision name=\"b\">x</collision></link>"
         );
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use prehend::grasp::{CloseOptions, GraspObject, ReadyHand, Reason};
+use prehend::grasp::{CloseOptions, GraspObject, ReadyHand};
 use prehend::grasp_table::ContactRecord;
 use prehend::hand::Hand;
 use prehend::stages::decompose::shape_of;
@@ -99,7 +99,7 @@ fn closed(
         support_plane,
     };
     let closed = ready.close(object, &pose, &preshape, &options)?;
-    Ok(json!({
+    let mut answer = json!({
         "pose": pose_json(&closed.object_from_root),
         "joints": hand.positions_by_name(&closed.joints),
         "contacts": closed.contacts.iter().map(|c| json!(ContactRecord::new(hand, c))).collect::<Vec<_>>(),
@@ -108,6 +108,9 @@ fn closed(
         "fvol_union": closed.free_volume.fvol_union,
         "penetration": closed.penetration,
         "reason": closed.reason.map(|r| r.to_string()),
-        "hint": closed.reason.map(Reason::hint),
-    }))
+    });
+    if let Some(reason) = closed.reason {
+        answer["hint"] = json!(reason.hint());
+    }
+    Ok(answer)
 }
