@@ -112,7 +112,7 @@ pub struct LearnedArc {
 ///
 /// # Errors
 ///
-/// As [`crate::train`]; rules that contradict each other; [`ModelError::NoRows`] where no row is complete.
+/// As [`Model::fit`](crate::Model::fit); rules that contradict each other; [`ModelError::NoRows`] where no row is complete.
 ///
 /// # Source
 ///
