@@ -12,9 +12,9 @@
 //! measured. They are few, and each measures itself and its six ends in one pass.
 
 use crate::edges::{
-    OWN, Planes, Row, column, end_beside, end_heights, far_end, height, near, pencil, rise, row, set_column,
-    set_end,
+    OWN, Row, column, end_beside, end_heights, far_end, height, near, pencil, rise, row, set_column, set_end,
 };
+use crate::facet::{Crossing, Entry, Facet, Link, fingerprint};
 use crate::hyperplane::{Hyperplane, dot, through_points};
 
 /// The near facets. Cleared and filled again, it keeps its memory. Points have six coordinates; those past `n_axes` are
@@ -44,75 +44,6 @@ pub(crate) struct Frontier {
 /// The structure contradicts itself, by rounding: the whole polytope must decide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Doubt;
-
-/// A facet, with the planes of its edges' ends beside its own.
-#[derive(Debug, Clone)]
-#[repr(align(64))]
-struct Facet {
-    /// One column a plane; `planes[r][k]` for k < 6 lies at the end of the edge that leaves `corners[k]`.
-    planes: Planes,
-    corners: [u16; 6],
-    /// The facet (and its slot) that an edge ends at.
-    links: [Link; 6],
-}
-
-/// A facet and one of its slots, packed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Link(u32);
-
-impl Link {
-    /// The edge ends at a far plane.
-    const FAR: Self = Self(u32::MAX);
-    const UNSET: Self = Self(u32::MAX - 1);
-
-    fn new(place: usize, slot: usize) -> Self {
-        Self((place as u32) << 3 | slot as u32)
-    }
-
-    fn is_facet(self) -> bool {
-        self.0 < Self::UNSET.0
-    }
-
-    fn place(self) -> usize {
-        (self.0 >> 3) as usize
-    }
-
-    fn slot(self) -> usize {
-        (self.0 & 7) as usize
-    }
-}
-
-/// Where a new point cuts an edge between near and far, or near and near.
-#[derive(Debug, Clone)]
-struct Crossing {
-    plane: Row,
-    /// The plane at the seen end, and the point's height over it.
-    seen: Row,
-    height: f64,
-    /// The facet that the edge belongs to, whether that one is seen, and the edge's slot.
-    base: u32,
-    base_is_seen: bool,
-    slot: usize,
-}
-
-/// The first facet with a ridge, in a table by the ridge's fingerprint.
-#[derive(Debug, Clone, Copy)]
-struct Entry {
-    ridge: u64,
-    /// The insertion that wrote this.
-    round: u64,
-    link: Link,
-}
-
-impl Default for Entry {
-    fn default() -> Self {
-        Self {
-            ridge: 0,
-            round: 0,
-            link: Link::UNSET,
-        }
-    }
-}
 
 impl Frontier {
     /// Starts again from a simplex of `n_axes` + 1 points. False where the simplex is too flat to have planes.
@@ -473,14 +404,6 @@ fn own_row(plane: &Row) -> [f64; 8] {
 
 /// A plane may pass its corners by this much before it is solved anew.
 const OFF_CORNERS: f64 = 1e-14;
-
-/// 64 well-mixed bits of a number (Steele, Lea, Flood: SplitMix, OOPSLA 2014).
-fn fingerprint(number: u64) -> u64 {
-    let mut z = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ z >> 31
-}
 
 #[cfg(test)]
 mod tests {

@@ -48,6 +48,7 @@ mod friction_cone;
 mod wrench_space;
 
 mod edges;
+mod facet;
 mod frontier;
 mod hyperplane;
 mod polytope;
