@@ -61,7 +61,9 @@
 
 mod error;
 
+mod arcs;
 mod network;
+mod network_file;
 mod network_text;
 mod table;
 
@@ -71,6 +73,7 @@ mod extra;
 mod interchange;
 mod json;
 mod model;
+mod model_check;
 mod priors;
 mod sample;
 

@@ -2,8 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::arcs::topological_order;
 use crate::error::{ModelError, list};
-use crate::model::topological_order;
 use crate::network::{Network, NodeKind};
 
 /// What the table `[structure]` of a network file says, by position of the nodes.
