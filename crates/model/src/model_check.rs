@@ -84,13 +84,7 @@ fn check_table(node: &Node, nodes: &[Node]) -> Result<(), ModelError> {
             expected: "at least one state, each with its own name".into(),
         });
     }
-    if cpd.table.len() != n_rows {
-        return Err(ModelError::Length {
-            what: format!("`table` of `{}`", node.name),
-            found: cpd.table.len(),
-            expected: n_rows,
-        });
-    }
+    check_rows(node, "table", cpd.table.len(), n_rows)?;
     for (row, entries) in cpd.table.iter().enumerate() {
         let sum: f64 = entries.iter().sum();
         let bad = entries.len() != cpd.states.len()
@@ -152,13 +146,7 @@ fn check_mixture(node: &Node, cpd: &MixtureCpd, nodes: &[Node]) -> Result<Vec<Ve
             });
         }
     }
-    if cpd.components.len() != n_rows {
-        return Err(ModelError::Length {
-            what: format!("`components` of `{}`", node.name),
-            found: cpd.components.len(),
-            expected: n_rows,
-        });
-    }
+    check_rows(node, "components", cpd.components.len(), n_rows)?;
     let mut factors = Vec::with_capacity(n_rows);
     for (configuration, row) in cpd.components.iter().enumerate() {
         let bad = |component: usize, problem: String| ModelError::BadComponent {
@@ -167,15 +155,12 @@ fn check_mixture(node: &Node, cpd: &MixtureCpd, nodes: &[Node]) -> Result<Vec<Ve
             component,
             problem,
         };
-        let sum: f64 = row.iter().map(|component| component.weight).sum();
         let mut row_factors = Vec::with_capacity(row.len());
         for (k, component) in row.iter().enumerate() {
             row_factors.push(check_component(component, cpd.dim(), q).map_err(|problem| bad(k, problem))?);
         }
-        if row.is_empty() || (sum - 1.0).abs() > SUM_TOLERANCE {
-            let problem = format!("the weights of this row sum to {sum}; expected 1");
-            return Err(bad(row.len().saturating_sub(1), problem));
-        }
+        check_sum(row.iter().map(|component| component.weight))
+            .map_err(|problem| bad(row.len().saturating_sub(1), problem))?;
         factors.push(row_factors);
     }
     if let Some((configuration, component, problem)) = cpd.unshared() {
@@ -198,13 +183,7 @@ fn check_directions(node: &Node, cpd: &VonMisesFisherCpd, nodes: &[Node]) -> Res
             problem: format!("`columns` has {d} entries; a direction needs at least 2"),
         });
     }
-    if cpd.components.len() != n_rows {
-        return Err(ModelError::Length {
-            what: format!("`components` of `{}`", node.name),
-            found: cpd.components.len(),
-            expected: n_rows,
-        });
-    }
+    check_rows(node, "components", cpd.components.len(), n_rows)?;
     for (configuration, row) in cpd.components.iter().enumerate() {
         let bad = |component: usize, problem: String| ModelError::BadComponent {
             node: node.name.clone(),
@@ -213,13 +192,7 @@ fn check_directions(node: &Node, cpd: &VonMisesFisherCpd, nodes: &[Node]) -> Res
             problem,
         };
         for (k, component) in row.iter().enumerate() {
-            if !(component.weight >= 0.0 && component.weight.is_finite()) {
-                let problem = format!(
-                    "the weight is {}; expected a number of at least 0",
-                    component.weight
-                );
-                return Err(bad(k, problem));
-            }
+            check_weight(component.weight).map_err(|problem| bad(k, problem))?;
             if component.direction.len() != d
                 || (component.direction.norm() - 1.0).abs() > SUM_TOLERANCE
                 || component.direction.iter().any(|v| !v.is_finite())
@@ -238,23 +211,15 @@ fn check_directions(node: &Node, cpd: &VonMisesFisherCpd, nodes: &[Node]) -> Res
                 return Err(bad(k, problem));
             }
         }
-        let sum: f64 = row.iter().map(|component| component.weight).sum();
-        if row.is_empty() || (sum - 1.0).abs() > SUM_TOLERANCE {
-            let problem = format!("the weights of this row sum to {sum}; expected 1");
-            return Err(bad(row.len().saturating_sub(1), problem));
-        }
+        check_sum(row.iter().map(|component| component.weight))
+            .map_err(|problem| bad(row.len().saturating_sub(1), problem))?;
     }
     Ok(())
 }
 
 fn check_component(component: &Component, d: usize, q: usize) -> Result<Root, String> {
     let covariance = &component.covariance;
-    if !(component.weight >= 0.0 && component.weight.is_finite()) {
-        return Err(format!(
-            "the weight is {}; expected a number of at least 0",
-            component.weight
-        ));
-    }
+    check_weight(component.weight)?;
     if component.mean.len() != d {
         return Err(format!(
             "`mean` has {} entries; expected {d}, one per column",
@@ -292,4 +257,31 @@ fn check_component(component: &Component, d: usize, q: usize) -> Result<Root, St
         }
     }
     Ok(factor)
+}
+
+fn check_rows(node: &Node, key: &str, found: usize, expected: usize) -> Result<(), ModelError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(ModelError::Length {
+        what: format!("`{key}` of `{}`", node.name),
+        found,
+        expected,
+    })
+}
+
+fn check_weight(weight: f64) -> Result<(), String> {
+    if weight >= 0.0 && weight.is_finite() {
+        return Ok(());
+    }
+    Err(format!("the weight is {weight}; expected a number of at least 0"))
+}
+
+/// A row of no components sums to 0.
+fn check_sum(weights: impl Iterator<Item = f64>) -> Result<(), String> {
+    let sum: f64 = weights.sum();
+    if (sum - 1.0).abs() <= SUM_TOLERANCE {
+        return Ok(());
+    }
+    Err(format!("the weights of this row sum to {sum}; expected 1"))
 }
