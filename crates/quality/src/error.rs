@@ -152,6 +152,13 @@ pub enum QualityError {
     #[error("0 samples say nothing; ask for at least 1")]
     NoSamples,
 
+    /// Contacts are to press with a force that is none.
+    #[error("the grip is {grip} N; expected a positive, finite force")]
+    BadGrip {
+        /// The force asked for.
+        grip: f64,
+    },
+
     /// A name is not one of the materials.
     #[error("`{found}` is not a material; expected glass, metal, plastic, wood, rubber or stone")]
     UnknownMaterial {

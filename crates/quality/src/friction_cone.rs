@@ -76,26 +76,41 @@ impl ContactWrenches {
 
     /// Appends the listed wrenches: the edges of the friction cone, or 20 samples of the limit surface. Without friction
     /// all are one, and listed once.
+    pub(crate) fn list(&self, circle: &[[f64; 2]], unit: LengthUnit, wrenches: &mut Vec<Wrench>) {
+        self.each(circle, unit, |at| wrenches.push(self.at(at)));
+    }
+
+    /// Calls `visit` with the (x, y, t) of each listed wrench.
     ///
     /// A point contact has `(x, y, t) = (cos θ, sin θ, 0)` at the angles of `circle`. A soft one samples the limit
     /// surface x² + y² + (t/e)² = 1 at the latitudes 90, 45, 0, −45, −90° with 1, 5, 8, 5, 1 longitudes: each direction
     /// is scaled onto the ellipsoid, whose third axis is counted in millimetres, whatever the unit of the points.
-    pub(crate) fn list(&self, circle: &[[f64; 2]], unit: LengthUnit, wrenches: &mut Vec<Wrench>) {
-        let [x_axis, y_axis, t_axis] = self.axes;
+    pub(crate) fn each(&self, circle: &[[f64; 2]], unit: LengthUnit, mut visit: impl FnMut([f64; 3])) {
         if self.frictionless {
-            wrenches.push(self.center);
+            visit([0.0; 3]);
         } else if self.torsion > 0.0 {
             let mm = match unit {
                 LengthUnit::Metre => 1e3,
                 LengthUnit::Millimetre => 1.0,
             };
             for [x, y, t] in limit_surface_samples(self.torsion * mm) {
-                wrenches.push(self.center + x_axis * x + y_axis * y + t_axis * (t / mm));
+                visit([x, y, t / mm]);
             }
         } else {
             for &[x, y] in circle {
-                wrenches.push(self.center + x_axis * x + y_axis * y);
+                visit([x, y, 0.0]);
             }
+        }
+    }
+
+    /// The wrench at (x, y, t).
+    pub(crate) fn at(&self, [x, y, t]: [f64; 3]) -> Wrench {
+        let [x_axis, y_axis, t_axis] = self.axes;
+        let tangential = self.center + x_axis * x + y_axis * y;
+        if t == 0.0 {
+            tangential
+        } else {
+            tangential + t_axis * t
         }
     }
 }

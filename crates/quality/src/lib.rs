@@ -11,7 +11,8 @@
 //!
 //! [`grasp_quality`] answers everything at once; [`EpsilonSolver`] answers only ε, thousands of times a second.
 //! [`TaskWrenches`] puts a task's own disturbances in the place of the ball, [`epsilon_sensitivity`] says which contact to
-//! move, and [`epsilon_distribution`] what remains of ε when contacts, pose and friction are not known exactly.
+//! move, [`epsilon_distribution`] what remains of ε when contacts, pose and friction are not known exactly, and
+//! [`internal_forces`] how hard each contact presses when the hand squeezes and the object stays.
 //! This crate knows points and normals. It never knows about hands.
 //!
 //! # Examples
@@ -61,6 +62,9 @@ mod growth;
 mod min_norm;
 mod volume;
 
+mod internal_forces;
+mod nnls;
+
 mod quality;
 mod sensitivity;
 mod task;
@@ -71,6 +75,7 @@ pub use coordinates::{WrenchAxes, WrenchMetric};
 pub use epsilon::{EpsilonBounds, EpsilonSolver, FORCE_CLOSURE_TOLERANCE, SMOOTH_TOLERANCE, epsilon};
 pub use error::QualityError;
 pub use friction_cone::Wrench;
+pub use internal_forces::{ContactForce, InternalForces, internal_forces};
 pub use material::{Material, friction_coefficient};
 pub use min_norm::origin_distance;
 pub use options::{ConeShape, LengthUnit, LimitSurface, Norm, QualityOptions};
