@@ -5,18 +5,14 @@
 //! ```
 //!
 //! One pass over the rows, in blocks that stay in the cache, gives the log-likelihood and the moments that the M-step
-//! (`moments.rs`) needs; nothing of the size of the data is stored. The two products of a block go through faer; between
-//! them all loops run over the rows of the block, several at once.
+//! (`moments.rs`) needs; nothing of the size of the data is stored (`em_block.rs`).
 
-use faer::{Accum, MatMut, MatRef, Par, linalg::matmul::matmul};
 use nalgebra::DMatrix;
 
-use crate::exponential::exp_below_zero;
+use crate::em_block::{BLOCK, Gatherer, Stack};
 use crate::gaussian::{LOG_TAU, cholesky, solve_lower};
 use crate::moments::{Mixing, Moment, Regression, Settings, log_prior, maximize};
 
-/// Rows of a block: white residuals and products of 256 rows fit into the second-level cache.
-const BLOCK: usize = 256;
 /// What rounding may take from J in one step, in shares of J.
 const ROUNDING: f64 = 1e-7;
 
@@ -117,202 +113,12 @@ pub(crate) fn acting(settings: &Settings, log_weights: &[f64], components: &[Reg
     out
 }
 
-/// Stacked white maps of several acting components, and the buffer for their residuals.
-struct Stack {
-    d: usize,
-    m: usize,
-    /// m × (d · components): one column for each dimension of each component.
-    maps: Vec<f64>,
-    constants: Vec<f64>,
-    residuals: Vec<f64>,
-}
-
-impl Stack {
-    fn new(d: usize, m: usize, acting: &[Acting]) -> Self {
-        let maps = acting
-            .iter()
-            .flat_map(|part| (0..d).flat_map(move |i| (0..m).map(move |j| part.white[(i, j)])));
-        Self {
-            d,
-            m,
-            maps: maps.collect(),
-            constants: acting.iter().map(|part| part.constant).collect(),
-            residuals: vec![0.0; d * acting.len() * BLOCK],
-        }
-    }
-
-    /// Log densities of the block's n rows: all rows under the first component, under the second …
-    fn log_densities(&mut self, z: &[f64], n: usize, out: &mut Vec<f64>) {
-        let columns = self.d * self.constants.len();
-        matmul(
-            MatMut::from_column_major_slice_mut(&mut self.residuals[..n * columns], n, columns),
-            Accum::Replace,
-            MatRef::from_row_major_slice(z, n, self.m),
-            MatRef::from_column_major_slice(&self.maps, self.m, columns),
-            1.0,
-            Par::Seq,
-        );
-        out.clear();
-        for (constant, part) in self.constants.iter().zip(self.residuals.chunks_exact(n * self.d)) {
-            let start = out.len();
-            out.resize(start + n, *constant);
-            for dimension in part.chunks_exact(n) {
-                for (log, residual) in out[start..].iter_mut().zip(dimension) {
-                    *log -= 0.5 * residual * residual;
-                }
-            }
-        }
-    }
-}
-
-/// Turns log densities of n rows into shares of each row's sum; `totals` become the logarithms of the sums.
-fn normalize(logs: &mut [f64], n: usize, totals: &mut Vec<f64>) {
-    totals.clear();
-    totals.resize(n, f64::NEG_INFINITY);
-    for part in logs.chunks_exact(n) {
-        for (total, log) in totals.iter_mut().zip(part) {
-            *total = if log > total { *log } else { *total };
-        }
-    }
-    let mut sums = [0.0; BLOCK];
-    let n_parts = logs.len() / n;
-    for part in logs.chunks_exact_mut(n) {
-        for ((log, total), sum) in part.iter_mut().zip(totals.iter()).zip(&mut sums) {
-            *log = exp_below_zero(*log - total);
-            *sum += *log;
-        }
-    }
-    let mut inverse = [0.0; BLOCK];
-    for (inverse, sum) in inverse.iter_mut().zip(&sums[..n]) {
-        *inverse = 1.0 / sum;
-    }
-    for part in logs.chunks_exact_mut(n) {
-        for (share, inverse) in part.iter_mut().zip(&inverse) {
-            *share *= inverse;
-        }
-    }
-    for (b, (total, sum)) in totals.iter_mut().zip(&sums).enumerate() {
-        if *total == f64::NEG_INFINITY {
-            for share in logs.iter_mut().skip(b).step_by(n) {
-                *share = 1.0 / n_parts as f64;
-            }
-        } else {
-            *total += sum.ln();
-        }
-    }
-}
-
-/// Sums responsibilities times z zᵀ, block by block.
-pub(crate) struct Gatherer {
-    d: usize,
-    m: usize,
-    n_components: usize,
-    latent_sign: bool,
-    products: Vec<f64>,
-    signed: Vec<f64>,
-    packed: Vec<f64>,
-    packed_signed: Vec<f64>,
-    masses: Vec<f64>,
-}
-
-impl Gatherer {
-    pub fn new(settings: &Settings, n_components: usize) -> Self {
-        let m = settings.m();
-        let t = m * (m + 1) / 2;
-        let both = usize::from(settings.latent_sign);
-        Self {
-            d: settings.d,
-            m,
-            n_components,
-            latent_sign: settings.latent_sign,
-            products: vec![0.0; t * BLOCK],
-            signed: vec![0.0; both * n_components * BLOCK],
-            packed: vec![0.0; t * n_components],
-            packed_signed: vec![0.0; both * t * n_components],
-            masses: vec![0.0; n_components],
-        }
-    }
-
-    /// One block. `shares` has those of all rows for the first component, for the second …, and with a latent sign those
-    /// of −y after them; it becomes shares times weights.
-    fn add(&mut self, z: &[f64], weights: &[f64], shares: &mut [f64]) {
-        let (n, m, k) = (weights.len(), self.m, self.n_components);
-        let t = m * (m + 1) / 2;
-        for (row, out) in z.chunks_exact(m).zip(self.products.chunks_exact_mut(t)) {
-            let mut at = 0;
-            for i in 0..m {
-                let scale = row[i];
-                for (out, other) in out[at..at + m - i].iter_mut().zip(&row[i..]) {
-                    *out = scale * other;
-                }
-                at += m - i;
-            }
-        }
-        for part in shares.chunks_exact_mut(n) {
-            for (share, weight) in part.iter_mut().zip(weights) {
-                *share *= weight;
-            }
-        }
-        if self.latent_sign {
-            let (plus, minus) = shares.split_at_mut(k * n);
-            for ((signed, plus), minus) in self.signed.iter_mut().zip(plus).zip(minus) {
-                *signed = *plus - *minus;
-                *plus += *minus;
-            }
-        }
-        for (mass, part) in self.masses.iter_mut().zip(shares.chunks_exact(n)) {
-            *mass += part.iter().sum::<f64>();
-        }
-        let gather = |packed: &mut [f64], shares: &[f64]| {
-            matmul(
-                MatMut::from_column_major_slice_mut(packed, t, k),
-                Accum::Add,
-                MatRef::from_column_major_slice(&self.products[..t * n], t, n),
-                MatRef::from_column_major_slice(&shares[..k * n], n, k),
-                1.0,
-                Par::Seq,
-            );
-        };
-        gather(&mut self.packed, shares);
-        if self.latent_sign {
-            gather(&mut self.packed_signed, &self.signed);
-        }
-    }
-
-    fn finish(self) -> Vec<Moment> {
-        let t = self.m * (self.m + 1) / 2;
-        (0..self.n_components)
-            .map(|c| {
-                let mut product = DMatrix::zeros(self.m, self.m);
-                let mut at = c * t;
-                for i in 0..self.m {
-                    for j in i..self.m {
-                        let between = i < self.d && j >= self.d && self.latent_sign;
-                        let value = if between {
-                            self.packed_signed[at]
-                        } else {
-                            self.packed[at]
-                        };
-                        product[(i, j)] = value;
-                        product[(j, i)] = value;
-                        at += 1;
-                    }
-                }
-                Moment {
-                    mass: self.masses[c],
-                    product,
-                }
-            })
-            .collect()
-    }
-}
-
 /// The E-step: Σ wᵢ log p, and the moments of each configuration and component, those of earlier rows included.
 pub(crate) fn expect(rows: &Rows, mixing: &Mixing) -> (f64, Vec<Vec<Moment>>) {
     let (settings, k) = (&rows.settings, mixing.k());
     let m = settings.m();
     let mut log_likelihood = 0.0;
-    let (mut logs, mut totals) = (Vec::new(), Vec::new());
+    let (mut shares, mut totals) = (Vec::new(), Vec::new());
     let moments = (0..rows.ends.len())
         .map(|cell| {
             let parts = acting(settings, &mixing.log_weights[cell], mixing.set(cell));
@@ -322,11 +128,10 @@ pub(crate) fn expect(rows: &Rows, mixing: &Mixing) -> (f64, Vec<Vec<Moment>>) {
             for start in range.clone().step_by(BLOCK) {
                 let n = BLOCK.min(range.end - start);
                 let z = &rows.z[start * m..(start + n) * m];
-                stack.log_densities(z, n, &mut logs);
                 let weights = &rows.weights[start..start + n];
-                normalize(&mut logs, n, &mut totals);
+                stack.shares(z, n, &mut shares, &mut totals);
                 log_likelihood += totals.iter().zip(weights).map(|(log, w)| log * w).sum::<f64>();
-                gatherer.add(z, weights, &mut logs);
+                gatherer.add(z, weights, &mut shares);
             }
             let mut moments = gatherer.finish();
             if let Some(earlier) = rows.earlier.get(cell) {
@@ -382,15 +187,14 @@ pub(crate) fn row_log_densities(rows: &Rows, mixing: &Mixing) -> Vec<f64> {
     let settings = &rows.settings;
     let m = settings.m();
     let mut out = Vec::with_capacity(rows.n());
-    let (mut logs, mut totals) = (Vec::new(), Vec::new());
+    let (mut shares, mut totals) = (Vec::new(), Vec::new());
     for cell in 0..rows.ends.len() {
         let parts = acting(settings, &mixing.log_weights[cell], mixing.set(cell));
         let mut stack = Stack::new(settings.d, m, &parts);
         let range = rows.cell(cell);
         for start in range.clone().step_by(BLOCK) {
             let n = BLOCK.min(range.end - start);
-            stack.log_densities(&rows.z[start * m..(start + n) * m], n, &mut logs);
-            normalize(&mut logs, n, &mut totals);
+            stack.shares(&rows.z[start * m..(start + n) * m], n, &mut shares, &mut totals);
             out.extend_from_slice(&totals);
         }
     }

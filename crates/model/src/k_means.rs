@@ -1,5 +1,6 @@
 //! k-means++ and some Lloyd steps: clusters to start EM from.
 
+use pulp::{Arch, Simd, WithSimd};
 use rand::{Rng, RngExt};
 
 /// Lloyd steps after k-means++: the start only has to be near.
@@ -15,46 +16,42 @@ pub(crate) fn k_means(
 ) -> Vec<(usize, f64)> {
     let n = points.len();
     let d = points[0].len();
-    let distance = |x: &[f64], center: &[f64]| -> (f64, f64) {
-        let (mut plus, mut minus) = (0.0, 0.0);
-        for (x, c) in x.iter().zip(center) {
-            plus += (x - c) * (x - c);
-            minus += (x + c) * (x + c);
-        }
-        if latent_sign && minus < plus {
-            (minus, -1.0)
-        } else {
-            (plus, 1.0)
-        }
+    let arch = Arch::new();
+    let columns: Vec<Vec<f64>> = (0..d)
+        .map(|j| points.iter().map(|point| point[j]).collect())
+        .collect();
+    let mut nearest = Nearest {
+        square: vec![f64::INFINITY; n],
+        center: vec![0.0; n],
+        sign: vec![1.0; n],
+    };
+    let look = |nearest: &mut Nearest, number: usize, center: &[f64]| {
+        arch.dispatch(Look {
+            columns: &columns,
+            center,
+            number: number as f64,
+            latent_sign,
+            nearest,
+        });
     };
     let mut centers = vec![points[draw(weights, rng)].to_vec()];
-    let mut square: Vec<f64> = vec![f64::INFINITY; n];
-    let mut weighted = vec![0.0; n];
     while centers.len() < k {
-        let newest = &centers[centers.len() - 1];
-        for i in 0..n {
-            square[i] = square[i].min(distance(points[i], newest).0);
-            weighted[i] = square[i] * weights[i];
-        }
+        look(&mut nearest, 0, &centers[centers.len() - 1]);
+        let weighted: Vec<f64> = nearest.square.iter().zip(weights).map(|(s, w)| s * w).collect();
         centers.push(points[draw(&weighted, rng)].to_vec());
     }
-    let mut label = vec![(0, 1.0); n];
     let mut masses = vec![0.0; k];
     for _ in 0..LLOYD_STEPS {
+        nearest.square.fill(f64::INFINITY);
+        for (c, center) in centers.iter().enumerate() {
+            look(&mut nearest, c, center);
+        }
         let mut sums = vec![0.0; k * d];
         masses.fill(0.0);
-        for (i, label) in label.iter_mut().enumerate() {
-            let mut least = f64::INFINITY;
-            for (c, center) in centers.iter().enumerate() {
-                let (square, sign) = distance(points[i], center);
-                if square < least {
-                    least = square;
-                    *label = (c, sign);
-                }
-            }
-            let (c, sign) = *label;
+        for (i, point) in points.iter().enumerate() {
+            let (c, sign) = nearest.of(i);
             masses[c] += weights[i];
-            for (sum, x) in sums[c * d..].iter_mut().zip(points[i]) {
+            for (sum, x) in sums[c * d..].iter_mut().zip(*point) {
                 *sum += weights[i] * sign * x;
             }
         }
@@ -70,7 +67,71 @@ pub(crate) fn k_means(
     for (new, &old) in order.iter().enumerate() {
         number[old] = new;
     }
-    label.into_iter().map(|(c, sign)| (number[c], sign)).collect()
+    (0..n)
+        .map(|i| {
+            let (c, sign) = nearest.of(i);
+            (number[c], sign)
+        })
+        .collect()
+}
+
+/// The nearest of the centers looked at so far, for each point.
+struct Nearest {
+    /// Squared distance.
+    square: Vec<f64>,
+    /// Its number, as a number of the same width as the others.
+    center: Vec<f64>,
+    /// −1 where −point is the nearer one.
+    sign: Vec<f64>,
+}
+
+impl Nearest {
+    fn of(&self, point: usize) -> (usize, f64) {
+        (self.center[point] as usize, self.sign[point])
+    }
+}
+
+/// Looks at one more center.
+struct Look<'a> {
+    columns: &'a [Vec<f64>],
+    center: &'a [f64],
+    number: f64,
+    latent_sign: bool,
+    nearest: &'a mut Nearest,
+}
+
+impl WithSimd for Look<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        const BLOCK: usize = 64;
+        let nearest = self.nearest;
+        let parts = nearest
+            .square
+            .chunks_mut(BLOCK)
+            .zip(nearest.center.chunks_mut(BLOCK));
+        let parts = parts.zip(nearest.sign.chunks_mut(BLOCK)).enumerate();
+        for (block, ((square, center), sign)) in parts {
+            let (mut plus, mut minus) = ([0.0; BLOCK], [0.0; BLOCK]);
+            for (column, c) in self.columns.iter().zip(self.center) {
+                let column = &column[block * BLOCK..][..square.len()];
+                for ((x, plus), minus) in column.iter().zip(&mut plus).zip(&mut minus) {
+                    *plus += (x - c) * (x - c);
+                    *minus += (x + c) * (x + c);
+                }
+            }
+            for i in 0..square.len() {
+                let turned = self.latent_sign && minus[i] < plus[i];
+                let found = if turned { minus[i] } else { plus[i] };
+                let nearer = found < square[i];
+                square[i] = if nearer { found } else { square[i] };
+                center[i] = if nearer { self.number } else { center[i] };
+                let found = if turned { -1.0 } else { 1.0 };
+                sign[i] = if nearer { found } else { sign[i] };
+            }
+        }
+    }
 }
 
 /// An index drawn in proportion to weights; the first where all are zero.

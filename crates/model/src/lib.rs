@@ -81,6 +81,7 @@ mod assemble;
 mod cell;
 mod cross_validation;
 mod em;
+mod em_block;
 mod exponential;
 mod family;
 mod gap_block;
