@@ -48,6 +48,7 @@ mod closing;
 mod contacts;
 mod features;
 mod free_surface;
+mod patch;
 mod refine;
 
 mod close;
@@ -57,7 +58,7 @@ mod synthesize;
 mod testing;
 
 pub use close::{CloseOptions, Closed, ReadyHand, close};
-pub use contacts::{CONTACT_TOLERANCE, MERGE_DISTANCE};
+pub use contacts::CONTACT_TOLERANCE;
 pub use error::GraspError;
 pub use features::{
     FreeVolume, UPOS_RADIUS, free_volume, free_volume_of_hull, object_size, palm_orientation,
@@ -67,6 +68,7 @@ pub use free_surface::{FreeSurface, free_surface};
 pub use grasp::{Features, Grasp, LinkContact};
 pub use hypothesis::{Face, Hypothesis, OPENING_MARGIN, PALM_CLEARANCE, hypotheses};
 pub use object::{GraspObject, Region};
+pub use patch::{MERGE_DISTANCE, MOST_CORNERS, SOFT_MERGE_DISTANCE};
 pub use reason::Reason;
 pub use synthesize::{
     HypothesisBoxes, Proposal, ROUND, Synthesis, SynthesisOptions, Tally, retry, synthesize, synthesize_each,
