@@ -2,10 +2,11 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use prehend_geometry::{Collider, Surface};
+use prehend_hand::JointPositions;
 
-use crate::GraspObject;
 use crate::first_touch::{Motion, NEAR, Track, first_touch};
 use crate::grasp_hand::GraspHand;
+use crate::{GraspObject, Reason};
 
 /// Near the object, solids move this far between two looks, metres.
 pub(crate) const LEAST_STEP: f64 = 5e-4;
@@ -22,28 +23,69 @@ pub(crate) fn look(surface: &Surface, solid: &Collider, pose: &Isometry3<f64>) -
     surface.gap(solid, pose, cutoff).map_or(cutoff, |g| g.distance)
 }
 
+/// A hand that has come in.
+pub(crate) struct Arrived {
+    pub(crate) object_from_root: Isometry3<f64>,
+    pub(crate) object_from_palm: Isometry3<f64>,
+    /// The solid that touched first.
+    pub(crate) solid: Option<usize>,
+}
+
+/// Moves an open hand along `direction` until something touches, at most `farthest`.
+pub(crate) fn arrive(
+    hand: &GraspHand<'_>,
+    object: &GraspObject,
+    preshape: &JointPositions,
+    object_from_root: &Isometry3<f64>,
+    direction: Vector3<f64>,
+    farthest: f64,
+) -> Result<Arrived, Reason> {
+    let poses = hand.all_poses(preshape);
+    let start = hand
+        .solids
+        .iter()
+        .map(|s| object_from_root * poses[s.link.0] * s.link_from_solid)
+        .collect();
+    let approach = Approach {
+        hand,
+        object,
+        start,
+        direction,
+    };
+    let arrival = approach.run(farthest).ok_or(Reason::StartCollision)?;
+    if arrival.solid.is_some_and(|i| !hand.solids[i].may_touch) {
+        return Err(Reason::ForbiddenLink);
+    }
+    let object_from_root = Translation3::from(direction * arrival.travelled) * object_from_root;
+    Ok(Arrived {
+        object_from_root,
+        object_from_palm: object_from_root * hand.hand.root_from_palm(preshape),
+        solid: arrival.solid,
+    })
+}
+
 /// Slides an open hand along a straight line.
-pub(crate) struct Approach<'a> {
-    pub(crate) hand: &'a GraspHand<'a>,
-    pub(crate) object: &'a GraspObject,
+struct Approach<'a> {
+    hand: &'a GraspHand<'a>,
+    object: &'a GraspObject,
     /// Pose of each solid at s = 0, object frame.
-    pub(crate) start: Vec<Isometry3<f64>>,
+    start: Vec<Isometry3<f64>>,
     /// Unit direction, object frame.
-    pub(crate) direction: Vector3<f64>,
+    direction: Vector3<f64>,
 }
 
 /// Where the approach ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Arrival {
+struct Arrival {
     /// Distance travelled, metres.
-    pub(crate) travelled: f64,
+    travelled: f64,
     /// The solid that touches, if any.
-    pub(crate) solid: Option<usize>,
+    solid: Option<usize>,
 }
 
 impl Approach<'_> {
     /// Travels up to `farthest`; `None` where the hand overlaps the object at the start.
-    pub(crate) fn run(&self, farthest: f64) -> Option<Arrival> {
+    fn run(&self, farthest: f64) -> Option<Arrival> {
         let mut tracks = vec![Track::unknown_at(0.0); self.hand.solids.len()];
         let touch = first_touch(self, &mut tracks, 0.0, farthest).ok()?;
         Some(Arrival {

@@ -4,10 +4,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend_hand::{Hand, JointPositions};
 use prehend_quality::EpsilonSolver;
 
+use crate::approach::arrive;
 use crate::closing::{Posture, close_fingers, self_collides};
 use crate::contacts::contacts_of;
 use crate::grasp_hand::GraspHand;
-use crate::synthesize::{arrive, checked_contacts, epsilon_of};
+use crate::measure::{checked_contacts, epsilon_of};
 use crate::{FreeVolume, GraspError, GraspObject, LinkContact, Reason, free_volume};
 
 /// How to close a candidate.

@@ -52,6 +52,9 @@ mod patch;
 mod refine;
 
 mod close;
+mod measure;
+mod run_try;
+mod synthesis_options;
 mod synthesize;
 
 #[cfg(test)]
@@ -70,7 +73,6 @@ pub use hypothesis::{Face, Hypothesis, OPENING_MARGIN, PALM_CLEARANCE, hypothese
 pub use object::{GraspObject, Region};
 pub use patch::{MERGE_DISTANCE, MOST_CORNERS, SOFT_MERGE_DISTANCE};
 pub use reason::Reason;
-pub use synthesize::{
-    HypothesisBoxes, Proposal, ROUND, Synthesis, SynthesisOptions, Tally, retry, synthesize, synthesize_each,
-};
+pub use synthesis_options::{HypothesisBoxes, SynthesisOptions};
+pub use synthesize::{Proposal, ROUND, Synthesis, Tally, retry, synthesize, synthesize_each};
 pub use tries::{MOST_PRESHAPES, OFFSET_SHARE, PRESHAPES, Preshapes, Tries, Try};
