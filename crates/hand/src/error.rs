@@ -74,7 +74,7 @@ pub enum HandError {
         /// The joint.
         joint: String,
         /// Its type.
-        found: &'static str,
+        found: String,
     },
 
     /// A number in the URDF is NaN or infinite, or has no meaning where it stands.

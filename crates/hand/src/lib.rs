@@ -54,3 +54,4 @@ pub use kinematics::LinkPoses;
 pub use posture::JointPositions;
 pub use propose::{Confidence, Guess, Proposal};
 pub use shape::Resolve;
+pub use xml::urdf_below;

@@ -8,9 +8,9 @@ use prehend_geometry::{
     GeometryError, MeshFormat, PlacedSolid, Shape, Solid, TriMesh, convex_hull, inspect, read_shape_with,
     repair, signed_volume,
 };
-use urdf_rs::Geometry;
 
 use crate::urdf::pose;
+use crate::xml::{Geometry, RawLink};
 use crate::{HandError, Link};
 
 /// Takes a mesh file's name, as the URDF gives it, to its bytes, or says why it cannot.
@@ -19,7 +19,7 @@ pub type Resolve<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 pub(crate) struct ShapeReader<'a> {
     resolve: &'a Resolve<'a>,
     /// What has been read: hands use the same file for several links.
-    meshes: BTreeMap<(String, [u64; 3], Use), Solid>,
+    meshes: BTreeMap<(String, [u64; 3], Use), Vec<Solid>>,
     warnings: Vec<String>,
 }
 
@@ -36,19 +36,20 @@ impl<'a> ShapeReader<'a> {
         self.warnings
     }
 
-    pub fn read_link(&mut self, raw: &urdf_rs::Link) -> Result<Link, HandError> {
+    pub fn read_link(&mut self, raw: &RawLink) -> Result<Link, HandError> {
         let place = || format!("link `{}`", raw.name);
         let mut collision = Vec::with_capacity(raw.collision.len());
         for element in &raw.collision {
             let link_from_solid = pose(&element.origin, place)?;
-            collision.push(self.read_solid(&raw.name, &element.geometry, link_from_solid, Use::Collision)?);
+            let solids = self.read_solids(&raw.name, &element.geometry, Use::Collision)?;
+            collision.extend(placed(solids, link_from_solid));
         }
         let collision = merge_capsules(collision);
         let mut visual = Vec::with_capacity(raw.visual.len());
         for element in &raw.visual {
             let link_from_solid = pose(&element.origin, place)?;
-            match self.read_solid(&raw.name, &element.geometry, link_from_solid, Use::Visual) {
-                Ok(solid) => visual.push(solid),
+            match self.read_solids(&raw.name, &element.geometry, Use::Visual) {
+                Ok(solids) => visual.extend(placed(solids, link_from_solid)),
                 Err(error @ (HandError::MeshMissing { .. } | HandError::MeshUnreadable { .. })) => {
                     self.warnings.push(format!("not drawn: {error}"));
                 }
@@ -63,19 +64,19 @@ impl<'a> ShapeReader<'a> {
         })
     }
 
-    fn read_solid(
+    /// The solids of one element: a mesh for collisions may be several convex ones.
+    fn read_solids(
         &mut self,
         link: &str,
         geometry: &Geometry,
-        link_from_solid: Isometry3<f64>,
         purpose: Use,
-    ) -> Result<PlacedSolid, HandError> {
+    ) -> Result<Vec<Solid>, HandError> {
         let size = |what, numbers: &[f64]| positive(link, what, numbers);
         let solid = match geometry {
             Geometry::Box { size: lengths } => {
-                size("box size", &lengths.0)?;
+                size("box size", lengths)?;
                 Solid::Cuboid {
-                    half_extents: Vector3::from(lengths.0) / 2.0,
+                    half_extents: Vector3::from(*lengths) / 2.0,
                 }
             }
             Geometry::Cylinder { radius, length } => {
@@ -98,25 +99,21 @@ impl<'a> ShapeReader<'a> {
                 Solid::Sphere { radius: *radius }
             }
             Geometry::Mesh { filename, scale } => {
-                let scale = scale.map_or(Vector3::repeat(1.0), |s| Vector3::from(s.0));
+                let scale = Vector3::from(*scale);
                 let key = (filename.clone(), scale.map(f64::to_bits).into(), purpose);
-                if let Some(solid) = self.meshes.get(&key) {
-                    solid.clone()
-                } else {
-                    let mesh = self.read_mesh(link, filename, &scale)?;
-                    let solid = match purpose {
-                        Use::Collision => collision_solid(mesh),
-                        Use::Visual => Solid::Mesh(Arc::new(mesh)),
-                    };
-                    self.meshes.insert(key, solid.clone());
-                    solid
+                if let Some(solids) = self.meshes.get(&key) {
+                    return Ok(solids.clone());
                 }
+                let mesh = self.read_mesh(link, filename, &scale)?;
+                let solids = match purpose {
+                    Use::Collision => collision_solids(mesh),
+                    Use::Visual => vec![Solid::Mesh(Arc::new(mesh))],
+                };
+                self.meshes.insert(key, solids.clone());
+                return Ok(solids);
             }
         };
-        Ok(PlacedSolid {
-            solid,
-            link_from_solid,
-        })
+        Ok(vec![solid])
     }
 
     fn read_mesh(&mut self, link: &str, file: &str, scale: &Vector3<f64>) -> Result<TriMesh, HandError> {
@@ -161,6 +158,13 @@ impl<'a> ShapeReader<'a> {
     }
 }
 
+fn placed(solids: Vec<Solid>, link_from_solid: Isometry3<f64>) -> impl Iterator<Item = PlacedSolid> {
+    solids.into_iter().map(move |solid| PlacedSolid {
+        solid,
+        link_from_solid,
+    })
+}
+
 /// What a solid is read for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Use {
@@ -172,22 +176,88 @@ enum Use {
 /// are finer than the collision meshes that come with hands.
 const HULL_DEFICIT: f64 = 1e-3;
 
-/// A mesh as a solid that collides: its convex hull where it fills that, else its surface.
-fn collision_solid(mesh: TriMesh) -> Solid {
-    let (mesh, _) = repair(mesh);
-    if inspect(&mesh).watertight
-        && let Ok(hull) = convex_hull(mesh.vertices())
-        && signed_volume(&mesh) >= (1.0 - HULL_DEFICIT) * hull.volume()
-        && hull.volume() > 0.0
-    {
-        let corners: BTreeSet<u32> = hull.triangles().iter().flatten().copied().collect();
-        let points = corners
-            .iter()
-            .map(|&corner| hull.points()[corner as usize])
-            .collect();
-        return Solid::Hull(Arc::new(points));
+/// A mesh as solids that collide: its convex hull where it fills that; the hulls of its parts where each part that
+/// hangs together fills its own (files of convex pieces are made so); else its surface.
+fn collision_solids(mesh: TriMesh) -> Vec<Solid> {
+    // In a file of pieces these do not share corners, though they may touch: parted before equal corners are merged.
+    let parts = parts(&mesh);
+    let (whole, _) = repair(mesh);
+    if let Some(hull) = filled_hull(&whole) {
+        return vec![hull];
     }
-    Solid::Mesh(Arc::new(mesh))
+    if (2..=MOST_PARTS).contains(&parts.len()) {
+        let hulls: Option<Vec<Solid>> = parts
+            .into_iter()
+            .map(|part| filled_hull(&repair(part).0))
+            .collect();
+        if let Some(hulls) = hulls {
+            return hulls;
+        }
+    }
+    vec![Solid::Mesh(Arc::new(whole))]
+}
+
+/// More parts than this are no pieces of a link but triangles of a surface without shared corners.
+const MOST_PARTS: usize = 256;
+
+/// The convex hull of a mesh that fills it.
+fn filled_hull(mesh: &TriMesh) -> Option<Solid> {
+    if !inspect(mesh).watertight {
+        return None;
+    }
+    let hull = convex_hull(mesh.vertices()).ok()?;
+    if hull.volume() <= 0.0 || signed_volume(mesh) < (1.0 - HULL_DEFICIT) * hull.volume() {
+        return None;
+    }
+    let corners: BTreeSet<u32> = hull.triangles().iter().flatten().copied().collect();
+    let points = corners
+        .iter()
+        .map(|&corner| hull.points()[corner as usize])
+        .collect();
+    Some(Solid::Hull(Arc::new(points)))
+}
+
+/// The parts of a mesh whose triangles share corners, in the order of their first triangles.
+fn parts(mesh: &TriMesh) -> Vec<TriMesh> {
+    // A forest over corners: each points to one of its part nearer the root.
+    let mut up: Vec<u32> = (0..mesh.vertices().len() as u32).collect();
+    let root = |up: &mut Vec<u32>, mut at: u32| {
+        while up[at as usize] != at {
+            up[at as usize] = up[up[at as usize] as usize];
+            at = up[at as usize];
+        }
+        at
+    };
+    for &[a, b, c] in mesh.triangles() {
+        let a = root(&mut up, a);
+        for other in [b, c] {
+            let other = root(&mut up, other);
+            up[other as usize] = a;
+        }
+    }
+    let mut part_of: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut triangles: Vec<Vec<[u32; 3]>> = Vec::new();
+    for &triangle in mesh.triangles() {
+        let n = part_of.len();
+        let part = *part_of.entry(root(&mut up, triangle[0])).or_insert(n);
+        if part == triangles.len() {
+            triangles.push(Vec::new());
+        }
+        triangles[part].push(triangle);
+    }
+    if triangles.len() > MOST_PARTS {
+        return Vec::new();
+    }
+    triangles
+        .into_iter()
+        .filter_map(|triangles| {
+            let used: BTreeSet<u32> = triangles.iter().flatten().copied().collect();
+            let place: BTreeMap<u32, u32> = used.iter().zip(0..).map(|(&old, new)| (old, new)).collect();
+            let vertices = used.iter().map(|&v| mesh.vertices()[v as usize]).collect();
+            let triangles = triangles.iter().map(|t| t.map(|v| place[&v])).collect();
+            TriMesh::new(vertices, triangles).ok()
+        })
+        .collect()
 }
 
 /// The mesh scaled along each axis; mirrored, it is wound the other way round, so that it still looks outwards.
@@ -251,9 +321,9 @@ fn positive(link: &str, what: &'static str, numbers: &[f64]) -> Result<(), HandE
     })
 }
 
-/// The mass, kg. A link without `<inertial>` comes out of the XML with mass 0, which stands for none.
-fn mass(raw: &urdf_rs::Link) -> Result<Option<f64>, HandError> {
-    let mass = raw.inertial.mass.value;
+/// The mass, kg; 0 stands for none.
+fn mass(raw: &RawLink) -> Result<Option<f64>, HandError> {
+    let mass = raw.mass.unwrap_or(0.0);
     if mass == 0.0 {
         return Ok(None);
     }

@@ -1,14 +1,14 @@
 //! From a URDF to a [`Hand`], checked.
 //!
-//! `urdf-rs` reads the XML. It checks next to nothing of what the elements say to each other, so that is done here.
+//! `xml.rs` reads the elements; what they say to each other is checked here.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
-use urdf_rs::JointType;
 
 use crate::hand::Attachment;
 use crate::shape::{Resolve, ShapeReader};
+use crate::xml::{RawJoint, RawPose, Robot};
 use crate::{Hand, HandError, Joint, JointIdx, JointKind, Link, LinkIdx, Mimic, xml};
 
 impl Hand {
@@ -73,7 +73,7 @@ fn named<'a>(
 
 /// All movable joints, and every joint's attachment in the URDF's order.
 fn read_joints(
-    robot: &urdf_rs::Robot,
+    robot: &Robot,
     links: &BTreeMap<&str, usize>,
 ) -> Result<(Vec<Joint>, Vec<Attachment>), HandError> {
     let mut joints = Vec::new();
@@ -90,7 +90,7 @@ fn read_joints(
                     link: link.to_owned(),
                 })
         };
-        let (parent, child) = (end("parent", &raw.parent.link)?, end("child", &raw.child.link)?);
+        let (parent, child) = (end("parent", &raw.parent)?, end("child", &raw.child)?);
         let parent_from_joint = pose(&raw.origin, || format!("joint `{}`", raw.name))?;
         let kind = kind(raw)?;
         let joint = kind.map(|_| JointIdx(joints.len()));
@@ -121,26 +121,23 @@ fn read_joints(
     Ok((joints, attachments))
 }
 
-fn kind(raw: &urdf_rs::Joint) -> Result<Option<JointKind>, HandError> {
-    let found = match raw.joint_type {
-        JointType::Fixed => return Ok(None),
-        JointType::Revolute => return Ok(Some(JointKind::Revolute)),
-        JointType::Continuous => return Ok(Some(JointKind::Continuous)),
-        JointType::Prismatic => return Ok(Some(JointKind::Prismatic)),
-        JointType::Floating => "floating",
-        JointType::Planar => "planar",
-        JointType::Spherical => "spherical",
-    };
-    Err(HandError::JointType {
-        joint: raw.name.clone(),
-        found,
-    })
+fn kind(raw: &RawJoint) -> Result<Option<JointKind>, HandError> {
+    match raw.kind.as_str() {
+        "fixed" => Ok(None),
+        "revolute" => Ok(Some(JointKind::Revolute)),
+        "continuous" => Ok(Some(JointKind::Continuous)),
+        "prismatic" => Ok(Some(JointKind::Prismatic)),
+        found => Err(HandError::JointType {
+            joint: raw.name.clone(),
+            found: found.to_owned(),
+        }),
+    }
 }
 
 /// A pose from `<origin>`: roll, pitch and yaw turn about the fixed x, y and z axes, in this order.
-pub(crate) fn pose(origin: &urdf_rs::Pose, place: impl Fn() -> String) -> Result<Isometry3<f64>, HandError> {
-    let ([x, y, z], [roll, pitch, yaw]) = (origin.xyz.0, origin.rpy.0);
-    for (what, numbers) in [("origin xyz", origin.xyz.0), ("origin rpy", origin.rpy.0)] {
+pub(crate) fn pose(origin: &RawPose, place: impl Fn() -> String) -> Result<Isometry3<f64>, HandError> {
+    let ([x, y, z], [roll, pitch, yaw]) = (origin.xyz, origin.rpy);
+    for (what, numbers) in [("origin xyz", origin.xyz), ("origin rpy", origin.rpy)] {
         if numbers.iter().any(|n| !n.is_finite()) {
             return Err(HandError::Value {
                 place: place(),
@@ -154,8 +151,8 @@ pub(crate) fn pose(origin: &urdf_rs::Pose, place: impl Fn() -> String) -> Result
     Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }
 
-fn axis(raw: &urdf_rs::Joint) -> Result<Unit<Vector3<f64>>, HandError> {
-    let axis = Vector3::from(raw.axis.xyz.0);
+fn axis(raw: &RawJoint) -> Result<Unit<Vector3<f64>>, HandError> {
+    let axis = Vector3::from(raw.axis);
     // Scaled first, so that lengths that overflow or vanish when squared are no matter.
     let scaled = axis / axis.amax();
     Unit::try_new(scaled, 0.5)
@@ -163,14 +160,14 @@ fn axis(raw: &urdf_rs::Joint) -> Result<Unit<Vector3<f64>>, HandError> {
         .ok_or_else(|| HandError::Value {
             place: format!("joint `{}`", raw.name),
             what: "axis",
-            found: format!("{:?}", raw.axis.xyz.0),
+            found: format!("{:?}", raw.axis),
             expected: "three finite numbers, not all 0",
         })
 }
 
 /// Lower and upper limit; those of a mimic joint that gives none are set later, from its leader's.
-fn limits(raw: &urdf_rs::Joint, kind: JointKind) -> Result<(f64, f64), HandError> {
-    let (lower, upper) = (raw.limit.lower, raw.limit.upper);
+fn limits(raw: &RawJoint, kind: JointKind) -> Result<(f64, f64), HandError> {
+    let (lower, upper) = (raw.lower, raw.upper);
     if kind == JointKind::Continuous {
         return Ok((f64::NEG_INFINITY, f64::INFINITY));
     }
@@ -196,20 +193,20 @@ fn limits(raw: &urdf_rs::Joint, kind: JointKind) -> Result<(f64, f64), HandError
 }
 
 /// Follows every chain of mimic joints to the free joint at its end and multiplies it out.
-fn resolve_mimics(robot: &urdf_rs::Robot, joints: &mut [Joint]) -> Result<(), HandError> {
+fn resolve_mimics(robot: &Robot, joints: &mut [Joint]) -> Result<(), HandError> {
     let movable: BTreeMap<String, usize> = joints
         .iter()
         .enumerate()
         .map(|(idx, joint)| (joint.name.clone(), idx))
         .collect();
-    let raw: BTreeMap<&str, &urdf_rs::Joint> = robot.joints.iter().map(|j| (j.name.as_str(), j)).collect();
+    let raw: BTreeMap<&str, &RawJoint> = robot.joints.iter().map(|j| (j.name.as_str(), j)).collect();
     for follower in 0..joints.len() {
         let name = joints[follower].name.clone();
         let (mut multiplier, mut offset) = (1.0, 0.0);
         let mut at = name.as_str();
         let mut steps = 0;
         while let Some(mimic) = &raw[at].mimic {
-            let (factor, summand) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+            let (factor, summand) = (mimic.multiplier, mimic.offset);
             if !(factor.is_finite() && summand.is_finite()) {
                 return Err(HandError::Value {
                     place: format!("joint `{at}`"),
@@ -262,7 +259,7 @@ fn resolve_mimics(robot: &urdf_rs::Robot, joints: &mut [Joint]) -> Result<(), Ha
 
 /// Finds the root and orders the attachments from it outwards.
 fn hang(
-    robot: &urdf_rs::Robot,
+    robot: &Robot,
     joints: &[Joint],
     mut placed: Vec<Attachment>,
 ) -> Result<(LinkIdx, Vec<Attachment>), HandError> {

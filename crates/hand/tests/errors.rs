@@ -68,38 +68,107 @@ fn text_that_is_no_urdf_is_refused() {
     }
     assert_says(
         "<sdf/>",
-        "URDF, document: the outermost element is not <robot>; expected a URDF",
+        "URDF, document: the outermost element is <sdf>; expected the <robot> of a URDF",
     );
     assert_says(
         "<robot name=\"empty\"/>",
         "URDF, robot: there is no <link>; expected <robot> with links and joints",
     );
-    assert_says(
+    let whole = "check that the file is complete and well-formed XML";
+    for cut in [
         "<robot name=\"x\">\n<link name=\"a\"",
-        "URDF, line 2: a tag is not closed; check that the file is complete",
-    );
-    assert_says(
         "<robot name=\"x\">\n<link name=\"a\">",
-        "URDF, link `a` (line 2): the element is not closed; check that the file is complete",
-    );
+    ] {
+        assert_says(
+            cut,
+            &format!(
+                "URDF, line 2, in or after link `a`: the root node was opened but never closed; {whole}"
+            ),
+        );
+    }
     assert_says(
-        "<robot name=\"x\">\n<!-- a > b",
-        "URDF, line 2: a comment is not closed; check that the file is complete",
+        "\n<robot name=\"x\">\n<joint name='j' type=\"fixed\">\n</link></robot>",
+        &format!("URDF, line 4, in or after joint `j`: expected 'joint' tag, not 'link' at 3:1; {whole}"),
     );
-    let deep = format!("<robot>{}", "<a>".repeat(100_000));
-    assert_says(
-        &deep,
-        "URDF, line 1: elements nest deeper than 64; expected a URDF",
-    );
+    for deep in [
+        format!("<robot>{}", "<a>".repeat(100_000)),
+        format!("<robot>{}{}", "<a>".repeat(100_000), "</a>".repeat(100_000)),
+    ] {
+        let message = read(&deep).unwrap_err().to_string();
+        assert!(message.starts_with("URDF, line 1: "), "{message}");
+    }
+}
+
+#[test]
+fn elements_need_what_they_are_made_of() {
+    for (old, new, message) in [
+        (
+            r#"<box size="0.1 0.1 0.02"/>"#,
+            "<box/>",
+            "URDF, link `palm` (line 2): <box> lacks `size`; add it",
+        ),
+        (
+            r#"<box size="0.1 0.1 0.02"/>"#,
+            "<plane/>",
+            "URDF, link `palm` (line 2): <plane> is not a shape that is read; expected box, cylinder, capsule, sphere \
+             or mesh",
+        ),
+        (
+            r#"<geometry><box size="0.1 0.1 0.02"/></geometry>"#,
+            "",
+            "URDF, link `palm` (line 2): it has no <geometry>; give it one, or delete it",
+        ),
+        (
+            r#"<link name="base"/>"#,
+            "<link/>",
+            "URDF, link `?` (line 3): <link> lacks `name`; add it",
+        ),
+        (
+            r#"<parent link="base"/>"#,
+            "",
+            "URDF, joint `bend` (line 10): it has no <parent link=\"…\"/>",
+        ),
+        (
+            r#" type="prismatic""#,
+            "",
+            "URDF, joint `follower` (line 14): <joint> lacks `type`; add it",
+        ),
+        (
+            r#"multiplier="0.5""#,
+            r#"multiplier="half""#,
+            "URDF, joint `follower` (line 16): `multiplier` of <mimic> is `half`; expected a number",
+        ),
+    ] {
+        assert_changed_says(old, new, message);
+    }
+}
+
+/// As exporters and simulators write them.
+#[test]
+fn what_says_nothing_of_shape_or_motion_may_be_incomplete() {
+    let bare = r#"<limit lower="-0.5" upper="1.5"/>"#;
+    let body = "<inertial><mass value=\"0.1\"/></inertial><inertial/><collision><geometry>";
+    let urdf = urdf_with(KNUCKLE_LIMIT, bare).replacen("<collision><geometry>", body, 1);
+    let transmission =
+        r#"<transmission name="t"><joint name="knuckle"><hardwareInterface/></joint></transmission></robot>"#;
+    let urdf = format!("\n{}", urdf.replace("</robot>", transmission));
+    let hand = read(&urdf).unwrap();
+    assert_eq!((hand.joints().len(), hand.joints()[0].upper), (3, 1.5));
+    assert_eq!(hand.links()[0].mass, Some(0.1));
 }
 
 #[test]
 fn an_element_that_cannot_be_read_is_named_with_its_line() {
     let urdf = urdf_with(r#"lower="-0.5" upper="1.5""#, r#"lower="-0,5" upper="1.5""#);
-    assert_says(&urdf, "URDF, joint `knuckle` (line 6): invalid float literal");
+    assert_says(
+        &urdf,
+        "URDF, joint `knuckle` (line 8): `lower` of <limit> is `-0,5`; expected a number",
+    );
     let urdf = urdf_with(r#"<box size="0.1 0.1 0.02"/>"#, r#"<box size="0.1 0.1"/>"#);
-    let message = read(&urdf).unwrap_err().to_string();
-    assert!(message.starts_with("URDF, link `palm` (line 2): "), "{message}");
+    assert_says(
+        &urdf,
+        "URDF, link `palm` (line 2): `size` of <box> is `0.1 0.1`; expected three numbers",
+    );
 }
 
 #[test]
