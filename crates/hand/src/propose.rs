@@ -93,6 +93,7 @@ impl Hand {
     /// - Pre-shapes: where the fingers closed around a cylinder they open again a little; the first principal direction of
     ///   these postures is the extension. The spread fans the fingertips out with the joints
     ///   that do not close, as far as the sides still oppose; without such joints it is the second principal direction.
+    ///   Both are limited to where pre-shapes do not collide with themselves.
     /// - Pairs of links are exempt from self-collision where they move as one, are neighbours, or overlap in each of 200
     ///   postures that fill the joints' ranges evenly.
     ///
@@ -139,7 +140,7 @@ impl Hand {
         };
         let mut described = self.clone();
         described.description = Some(description(&preshapes, 0.1));
-        preshapes.open_until_free(&described, &solids, &pairs);
+        preshapes.keep_free(&described, &solids, &pairs);
         described.description = Some(description(&preshapes, 0.1));
         let width = opening::opening_width(&anatomy, &described, &motion.thumb_side);
         let width_known = width > 1e-3;

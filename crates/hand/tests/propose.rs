@@ -152,7 +152,7 @@ fn hands_from_elsewhere_are_found_to_close_as_they_do() {
             [0.0, 0.0, 1.0],
             4,
             11,
-            [0.08, 0.16],
+            [0.08, 0.18],
         ),
         (
             "barrett_hand/bhand_model.urdf",

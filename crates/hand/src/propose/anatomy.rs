@@ -11,6 +11,14 @@ use crate::{Hand, HandError, JointIdx, JointPositions, LinkIdx};
 const LINKAGE_SHARE: f64 = 0.6;
 /// Axes that differ by less than this angle's cosine (15°) count as parallel.
 const PARALLEL: f64 = 0.966;
+/// The tip of a finger is what of its last link is farther from the last joint than this share of the farthest point.
+const TIP_SHARE: f64 = 0.5;
+/// What reaches farther (m) than this from where it branches off is an arm or a body, not a finger.
+const LONGEST_FINGER: f64 = 0.5;
+/// Joints in a row without a branch: up to so many are a finger, more an arm with one jaw.
+const FINGER_JOINTS: usize = 3;
+/// Joints below the palm: up to so many are a wrist, more an arm.
+const WRIST_JOINTS: usize = 2;
 
 /// The parts of a hand: what moves as one, and what hangs on what.
 pub(super) struct Anatomy<'a> {
@@ -21,8 +29,10 @@ pub(super) struct Anatomy<'a> {
     pub groups: Vec<Vec<LinkIdx>>,
     /// The group that the fingers hang on.
     pub palm_group: usize,
-    /// The link of that group with the largest shape.
+    /// The link of that group that carries most fingers and has a shape; else the largest.
     pub palm: LinkIdx,
+    /// The whole palm's surface, in the frame of `palm`.
+    pub palm_surface: Option<Surface>,
     /// The fingers, in the URDF's order.
     pub fingers: Vec<Chain>,
     /// How many chains were left out as linkages.
@@ -35,7 +45,7 @@ pub(super) struct Chain {
     pub joints: Vec<JointIdx>,
     /// Links with a shape on it, from the palm outwards; never empty.
     pub links: Vec<LinkIdx>,
-    /// Hull of what the last joint moves, in the frame of `tip_link`.
+    /// Hull of the far half of what the last joint moves, in the frame of `tip_link`.
     pub tip: Collider,
     /// Its corners.
     pub tip_points: Vec<Point3<f64>>,
@@ -71,6 +81,37 @@ fn hull_corners(points: Vec<Point3<f64>>) -> Vec<Point3<f64>> {
     }
 }
 
+/// Corners of what of a hull is far from a point.
+fn far_part(points: Vec<Point3<f64>>, from: &Point3<f64>) -> Vec<Point3<f64>> {
+    let Ok(hull) = convex_hull(&points) else {
+        return points;
+    };
+    let corners = hull.points();
+    let Some(farthest) = corners
+        .iter()
+        .max_by(|a, b| (*a - from).norm().total_cmp(&(*b - from).norm()))
+    else {
+        return points;
+    };
+    let out = farthest - from;
+    let beyond = |p: &Point3<f64>| (p - from).dot(&out) - TIP_SHARE * out.norm_squared();
+    let mut kept: Vec<Point3<f64>> = Vec::new();
+    for &[a, b, c] in hull.triangles() {
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            let (p, q) = (corners[p as usize], corners[q as usize]);
+            let (u, v) = (beyond(&p), beyond(&q));
+            if u >= 0.0 {
+                kept.push(p);
+            }
+            // Each edge belongs to two triangles, once in each sense.
+            if u < 0.0 && v > 0.0 {
+                kept.push(p + (q - p) * (u / (u - v)));
+            }
+        }
+    }
+    hull_corners(kept)
+}
+
 /// The hull of points as something to measure distances of.
 pub(super) fn hull_of(points: &[Point3<f64>]) -> Option<Collider> {
     Collider::new(&Solid::Hull(points.to_vec().into())).ok()
@@ -85,17 +126,8 @@ impl<'a> Anatomy<'a> {
             ));
         }
         let tree = Tree::new(hand, &points);
-        let palm_group = tree.palm_group();
-        let palm = tree.groups[palm_group]
-            .iter()
-            .copied()
-            .max_by(|a, b| {
-                // The first of equals.
-                diagonal(&points[a.0])
-                    .total_cmp(&diagonal(&points[b.0]))
-                    .then(b.cmp(a))
-            })
-            .expect("a group has links");
+        let palm_group = tree.palm_group(&points)?;
+        let palm = tree.palm_link(palm_group, &points);
         let zero = hand.joint_positions_from_slice(&vec![0.0; hand.joints.len()]);
         let mut fingers: Vec<Chain> = Vec::new();
         for leaf in tree.leaves_below(palm_group) {
@@ -108,15 +140,18 @@ impl<'a> Anatomy<'a> {
         }
         let n_chains = fingers.len();
         let fingers = without_linkages(hand, fingers, &zero);
-        Ok(Self {
+        let mut anatomy = Self {
             hand,
             groups: tree.groups,
             palm_group,
             palm,
+            palm_surface: None,
             n_linkages: n_chains - fingers.len(),
             fingers,
             points,
-        })
+        };
+        anatomy.palm_surface = anatomy.surface_of_palm();
+        Ok(anatomy)
     }
 
     /// Points of the whole palm, in the frame of the palm's link. Empty where it has no shape.
@@ -135,8 +170,7 @@ impl<'a> Anatomy<'a> {
             .collect()
     }
 
-    /// The whole palm's surface, in the frame of the palm's link.
-    pub fn palm_surface(&self) -> Option<Surface> {
+    fn surface_of_palm(&self) -> Option<Surface> {
         let zero = self
             .hand
             .joint_positions_from_slice(&vec![0.0; self.hand.joints.len()]);
@@ -181,6 +215,26 @@ impl<'a> Anatomy<'a> {
             .map(LinkIdx)
             .filter(|&l| !self.points[l.0].is_empty() && below(l))
             .collect()
+    }
+}
+
+impl Hand {
+    /// The link with which the hand begins: the root, wrists included, or the first link beyond the last joint of an
+    /// arm (more than two joints) that the URDF has below the palm.
+    ///
+    /// # Errors
+    ///
+    /// [`HandError::NotAHand`] where no link has a shape, or where the URDF is of a robot with several hands or none.
+    pub fn base_of_hand(&self) -> Result<LinkIdx, HandError> {
+        let points: Vec<Vec<Point3<f64>>> = (0..self.links.len()).map(|l| link_points(self, l)).collect();
+        let tree = Tree::new(self, &points);
+        let palm = tree.palm_group(&points)?;
+        let first = tree.groups[palm][0];
+        if self.joints_to(first).len() > WRIST_JOINTS {
+            Ok(first)
+        } else {
+            Ok(self.root())
+        }
     }
 }
 
@@ -260,33 +314,116 @@ impl<'a> Tree<'a> {
             .filter(move |&g| self.bears_shape[g] && self.parents[g].is_some_and(|(p, _)| p == group))
     }
 
-    /// The first group from the root outwards at which the tree branches; the root's where it never does.
-    fn palm_group(&self) -> usize {
+    /// The first group from the root outwards at which the tree branches into parts of a finger's length. Where it
+    /// never branches, the root's, or below the last joint of a longer row.
+    fn palm_group(&self, points: &[Vec<Point3<f64>>]) -> Result<usize, HandError> {
         let mut at = 0;
+        let mut row = vec![0];
         loop {
             let mut children = self.children(at);
             match (children.next(), children.next()) {
-                (Some(only), None) => at = only,
-                (Some(_), Some(_)) => return at,
-                (None, _) => return 0,
+                (Some(only), None) => {
+                    at = only;
+                    row.push(at);
+                }
+                (Some(_), Some(_)) => break,
+                (None, _) if row.len() > FINGER_JOINTS + 1 => return Ok(row[row.len() - 2]),
+                (None, _) => return Ok(0),
             }
         }
+        let reach = self.reach(at, points);
+        if reach <= LONGEST_FINGER {
+            return Ok(at);
+        }
+        let fitting: Vec<usize> = (0..self.groups.len())
+            .filter(|&g| self.is_below(g, at) && self.children(g).count() > 1)
+            .filter(|&g| self.reach(g, points) <= LONGEST_FINGER)
+            .collect();
+        // The outermost only: a finger may branch, too.
+        let outer: Vec<usize> = fitting
+            .iter()
+            .copied()
+            .filter(|&g| !fitting.iter().any(|&other| self.is_below(g, other)))
+            .collect();
+        if let [only] = outer[..] {
+            return Ok(only);
+        }
+        let name = |g: usize| format!("`{}`", self.hand.link(self.groups[g][0]).name);
+        let hands = match outer.len() {
+            0 => "no hand hangs on it either; take the part of the URDF that is one".to_owned(),
+            _ => format!(
+                "{} hands hang on it: take the one that begins at {}",
+                outer.len(),
+                outer.iter().map(|&g| name(g)).collect::<Vec<_>>().join(" or ")
+            ),
+        };
+        Err(not_a_hand(&format!(
+            "it branches at {} into parts that reach {reach:.1} m, which are no fingers; {hands}",
+            name(at)
+        )))
+    }
+
+    /// How far (m) what hangs on a group reaches from the joints that it hangs on, at most, all joints at 0.
+    fn reach(&self, group: usize, points: &[Vec<Point3<f64>>]) -> f64 {
+        let zero = vec![0.0; self.hand.joints.len()];
+        let poses = self.hand.link_poses(&self.hand.joint_positions_from_slice(&zero));
+        let mut reach = 0.0_f64;
+        for child in self.children(group) {
+            let (base, _) = match self.parents[child] {
+                Some((_, joint)) => self.hand.joint_axis(joint, &poses),
+                None => continue,
+            };
+            let carried = (0..self.groups.len()).filter(|&g| g == child || self.is_below(g, child));
+            for link in carried.flat_map(|g| &self.groups[g]) {
+                let root_from_link = poses.root_from_link(*link);
+                let far = points[link.0].iter().map(|p| (root_from_link * p - base).norm());
+                reach = far.fold(reach, f64::max);
+            }
+        }
+        reach
+    }
+
+    /// Whether a group hangs on another one, directly or through others.
+    fn is_below(&self, group: usize, above: usize) -> bool {
+        let mut at = self.parents[group];
+        while let Some((parent, _)) = at {
+            if parent == above {
+                return true;
+            }
+            at = self.parents[parent];
+        }
+        false
+    }
+
+    /// The link of a group that carries most other groups and has a shape; else the one with the largest shape.
+    fn palm_link(&self, group: usize, points: &[Vec<Point3<f64>>]) -> LinkIdx {
+        let carried = |link: LinkIdx| {
+            self.children(group)
+                .filter(|&g| self.parents[g].is_some_and(|(_, j)| self.hand.joint(j).parent == link))
+                .count()
+        };
+        let carries_some = |link: &LinkIdx| !points[link.0].is_empty() && carried(*link) > 0;
+        let links = &self.groups[group];
+        links
+            .iter()
+            .copied()
+            .filter(carries_some)
+            // The first of equals.
+            .max_by_key(|&l| (carried(l), std::cmp::Reverse(l)))
+            .or_else(|| {
+                links.iter().copied().max_by(|a, b| {
+                    diagonal(&points[a.0])
+                        .total_cmp(&diagonal(&points[b.0]))
+                        .then(b.cmp(a))
+                })
+            })
+            .expect("a group has links")
     }
 
     /// Groups below `palm` that carry no further one, in the order of their first joint.
     fn leaves_below(&self, palm: usize) -> Vec<usize> {
-        let is_below = |group: usize| {
-            let mut at = self.parents[group];
-            while let Some((parent, _)) = at {
-                if parent == palm {
-                    return true;
-                }
-                at = self.parents[parent];
-            }
-            false
-        };
         let mut leaves: Vec<usize> = (0..self.groups.len())
-            .filter(|&g| self.bears_shape[g] && is_below(g) && self.children(g).next().is_none())
+            .filter(|&g| self.bears_shape[g] && self.is_below(g, palm) && self.children(g).next().is_none())
             .collect();
         leaves.sort_by_key(|&g| self.way(palm, g).first().map(|(_, joint)| *joint));
         leaves
@@ -326,8 +463,16 @@ impl<'a> Tree<'a> {
                 points[l.0].iter().map(move |p| tip_from_link * p)
             })
             .collect::<Vec<_>>();
-        let tip_points = hull_corners(tip_points);
         let joints: Vec<JointIdx> = way.iter().map(|(_, joint)| *joint).collect();
+        let last = *joints.last()?;
+        let tip_points = if self.hand.joint(last).kind == crate::JointKind::Prismatic {
+            hull_corners(tip_points)
+        } else {
+            far_part(
+                tip_points,
+                &(tip_from_root * self.hand.joint_axis(last, &poses).0),
+            )
+        };
         Some(Chain {
             flexion: self.flexion(&joints, zero),
             joints,

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::Collider;
 
-use super::anatomy::{Anatomy, Chain, hull_of};
+use super::anatomy::{Anatomy, Chain};
 use crate::{JointIdx, JointKind, JointPositions, LinkPoses};
 
 /// Looks along the way from open to closed.
@@ -62,7 +62,7 @@ impl Motion {
         (motion.direction, motion.margin) = directions(anatomy, &groups, &motion.reference);
         let sides = Sides::of(anatomy, &motion);
         motion.thumb_side = sides.thumb_side;
-        motion.opposition = sides.score;
+        motion.opposition = sides.closed;
         motion.gaps = sides.gaps;
         motion
     }
@@ -149,11 +149,14 @@ impl Motion {
     }
 }
 
-/// A joint's range; a quarter turn either way where it has none.
+/// A joint's range; a quarter turn either way where it has none, or more than a full turn.
 pub(super) fn bounded(anatomy: &Anatomy<'_>, joint: usize) -> (f64, f64) {
     let joint = anatomy.hand.joint(JointIdx(joint));
-    if joint.kind == JointKind::Continuous {
-        (-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2)
+    let turns = joint.kind != JointKind::Prismatic;
+    if turns && joint.upper - joint.lower > std::f64::consts::TAU {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let middle = 0.0_f64.clamp(joint.lower + quarter, joint.upper - quarter);
+        (middle - quarter, middle + quarter)
     } else {
         (joint.lower, joint.upper)
     }
@@ -238,17 +241,14 @@ fn directions(anatomy: &Anatomy<'_>, groups: &[Driven], reference: &[f64]) -> (V
     let group_of: Vec<usize> = (0..anatomy.fingers.len())
         .map(|f| groups.iter().position(|g| g.fingers.contains(&f)).unwrap_or(0))
         .collect();
-    let palm = hull_of(&anatomy.palm_points());
     let to_palm: Vec<[f64; 2]> = (0..ways.len())
         .map(|f| {
             [0, 1].map(|s| {
-                let gaps = palm.as_ref().map(|palm| {
-                    ways[f][s]
-                        .iter()
-                        .map(|pose| gap(palm, &anatomy.fingers[f].tip, pose))
-                        .collect::<Vec<_>>()
-                });
-                gaps.map_or(0.0, |g| approach_of(&g))
+                let gaps = ways[f][s].iter();
+                let gaps: Vec<f64> = gaps
+                    .map(|pose| gap_to_palm(anatomy, &anatomy.fingers[f], pose))
+                    .collect();
+                approach_of(&gaps)
             })
         })
         .collect();
@@ -329,6 +329,14 @@ fn looks() -> impl Iterator<Item = f64> {
     (0..LOOKS).map(|look| look as f64 / (LOOKS - 1) as f64)
 }
 
+/// Gap between a fingertip and the palm; 0 where that has no shape.
+fn gap_to_palm(anatomy: &Anatomy<'_>, finger: &Chain, palm_from_tip: &Isometry3<f64>) -> f64 {
+    anatomy.palm_surface.as_ref().map_or(0.0, |palm| {
+        palm.gap(&finger.tip, palm_from_tip, FAR)
+            .map_or(FAR, |g| g.distance)
+    })
+}
+
 fn gap(a: &Collider, b: &Collider, a_from_b: &Isometry3<f64>) -> f64 {
     a.distance_to(b, a_from_b, FAR).unwrap_or(FAR)
 }
@@ -343,7 +351,9 @@ fn approach_of(gaps: &[f64]) -> f64 {
 /// The two sides that oppose each other.
 struct Sides {
     thumb_side: Vec<bool>,
-    /// Mean way that fingers of both sides come nearer each other, less the way that fingers of one side do.
+    /// Mean way that fingers of both sides come nearer each other.
+    closed: f64,
+    /// The same, less the way that fingers of one side do.
     score: f64,
     /// The score, less what is left of the gap between the sides at its least.
     merit: f64,
@@ -394,17 +404,14 @@ impl Sides {
     fn of(anatomy: &Anatomy<'_>, motion: &Motion) -> Self {
         let fingers = &anatomy.fingers;
         if fingers.len() == 1 {
-            let palm = hull_of(&anatomy.palm_points());
             let gaps: Vec<f64> = looks()
                 .map(|t| anatomy.palm_from_tip(&fingers[0], &motion.at(anatomy, t)))
-                .map(|pose| {
-                    palm.as_ref()
-                        .map_or(0.0, |palm| gap(palm, &fingers[0].tip, &pose))
-                })
+                .map(|pose| gap_to_palm(anatomy, &fingers[0], &pose))
                 .collect();
             let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
             return Self {
                 thumb_side: vec![false],
+                closed: closed_by(&gaps),
                 score: closed_by(&gaps),
                 merit: closed_by(&gaps) - least,
                 gaps,
@@ -430,7 +437,8 @@ impl Sides {
             let mean_closed = |pairs: &[&Vec<f64>]| {
                 pairs.iter().map(|g| closed_by(g)).sum::<f64>() / pairs.len().max(1) as f64
             };
-            let score = mean_closed(&cross) - mean_closed(&same);
+            let closed = mean_closed(&cross);
+            let score = closed - mean_closed(&same);
             if best.as_ref().is_some_and(|b| b.score >= score - 1e-9) {
                 continue;
             }
@@ -443,6 +451,7 @@ impl Sides {
             let second_is_thumb = 2 * n_second < n;
             best = Some(Self {
                 thumb_side: (0..n).map(|f| on_second(f) == second_is_thumb).collect(),
+                closed,
                 score,
                 merit: score - least,
                 gaps: mean_gaps,

@@ -53,7 +53,6 @@ pub(super) fn palm_frame(anatomy: &Anatomy<'_>, motion: &Motion) -> (Found, Wrap
     }
     let center = mean(&palm_points);
     let size = diagonal(&palm_points).max(1e-6);
-    let surface = anatomy.palm_surface();
     let closing = closing_order(anatomy, motion);
     let mut found: Vec<(f64, PalmFrame, Wraps)> = candidates
         .into_iter()
@@ -61,7 +60,7 @@ pub(super) fn palm_frame(anatomy: &Anatomy<'_>, motion: &Motion) -> (Found, Wrap
             let x = closing_axis(&axes, &turning, from_thumb, &z);
             let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
             let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
-            let origin = on_palm(&palm_points, surface.as_ref(), &meeting, &rotation);
+            let origin = on_palm(&palm_points, anatomy.palm_surface.as_ref(), &meeting, &rotation);
             let palm = PalmFrame {
                 link: anatomy.palm,
                 link_from_palm: Isometry3::from_parts(origin.into(), rotation),

@@ -50,6 +50,8 @@ fn reach_and_gap(
     positions: &JointPositions,
 ) -> (f64, f64) {
     let palm_from_root = hand.root_from_palm(positions).inverse();
+    let link_from_palm = hand.description().expect("just described").palm.link_from_palm;
+    let palm_from_link = link_from_palm.inverse();
     let side = |of_thumb: bool| {
         let (mut inner, mut reach, mut n) = (0.0, 0.0, 0.0);
         for (finger, _) in anatomy
@@ -69,17 +71,23 @@ fn reach_and_gap(
             return (inner / n, reach / n);
         }
         // No finger on this side: the other one closes on the palm.
-        let palm_from_link = hand
-            .description()
-            .expect("just described")
-            .palm
-            .link_from_palm
-            .inverse();
         let (low, high, top) = extremes(anatomy.palm_points().into_iter().map(|p| palm_from_link * p));
         (if of_thumb { high } else { low }, top)
     };
     let ((thumb, thumb_reach), (fingers, reach)) = (side(true), side(false));
-    (thumb_reach.min(reach), fingers - thumb)
+    let reach = thumb_reach.min(reach);
+    // A jaw of the palm's own may stand in the one finger's way before the palm's end does.
+    if let ([finger], Some(surface)) = (&anatomy.fingers[..], &anatomy.palm_surface) {
+        let link_from_tip = link_from_palm * palm_from_root * hand.link_pose(finger.tip_link, positions);
+        let towards_palm = link_from_palm * -nalgebra::Vector3::x();
+        let corners = finger.tip_points.iter().map(|p| link_from_tip * p);
+        let hits = corners.filter_map(|p| surface.cast_ray(&p, &towards_palm, 1.0));
+        let gap = hits.map(|h| h.distance).fold(f64::INFINITY, f64::min);
+        if gap.is_finite() {
+            return (reach, gap);
+        }
+    }
+    (reach, fingers - thumb)
 }
 
 /// Least x, greatest x, greatest z.

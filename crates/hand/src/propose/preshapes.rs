@@ -119,29 +119,69 @@ impl Preshapes {
         }
     }
 
-    /// Raises the closed end of the extension until pre-shapes there do not collide with themselves.
-    pub fn open_until_free(
+    /// Narrows both amplitudes' limits to pre-shapes that do not collide with themselves: of a grid of pre-shapes to the
+    /// block with the most free ones, where a collision undoes [`COLLISION_COST`] free ones. Kept as they are where all
+    /// collide.
+    pub fn keep_free(
         &mut self,
         described: &Hand,
         solids: &LinkSolids<'_>,
         exempt: &BTreeSet<(LinkIdx, LinkIdx)>,
     ) {
-        let mut hand = described.clone();
-        let extension = &mut self.eigengrasps[1];
-        let step = (extension.upper - extension.lower) / 10.0;
-        for _ in 0..8 {
-            let description = hand.description.as_mut().expect("just described");
-            description.eigengrasps[1].clone_from(extension);
-            let collides = [-1.0, -0.5, 0.0, 0.5, 1.0]
-                .iter()
-                .filter(|&&spread| solids.collides(exempt, &hand.preshape([spread, -1.0])))
-                .count();
-            if collides <= 1 {
-                break;
-            }
-            extension.lower += step;
+        let at = |k: usize| 2.0 * k as f64 / (GRID - 1) as f64 - 1.0;
+        let free: Vec<Vec<bool>> = (0..GRID)
+            .map(|i| {
+                (0..GRID)
+                    .map(|j| !solids.collides(exempt, &described.preshape([at(i), at(j)])))
+                    .collect()
+            })
+            .collect();
+        let Some(block) = best_block(&free) else {
+            return;
+        };
+        let ends = self.eigengrasps.iter_mut().zip(block);
+        for (eigengrasp, (first, last)) in ends {
+            let (lower, upper) = (eigengrasp.lower, eigengrasp.upper);
+            let step = (upper - lower) / (GRID - 1) as f64;
+            // One row only stands for the amplitudes nearest to it.
+            let (low, high) = if first == last {
+                (first as f64 - 0.25, last as f64 + 0.25)
+            } else {
+                (first as f64, last as f64)
+            };
+            eigengrasp.lower = (lower + low * step).max(lower);
+            eigengrasp.upper = (lower + high * step).min(upper);
         }
     }
+}
+
+/// Amplitudes looked at along each direction.
+const GRID: usize = 11;
+/// What a pre-shape that collides with itself counts in a block, against free ones of 1.
+const COLLISION_COST: f64 = 8.0;
+
+/// First and last row, first and last column of the block that counts most; `None` where no cell is free.
+fn best_block(free: &[Vec<bool>]) -> Option<[(usize, usize); 2]> {
+    let value = |i: usize, j: usize| if free[i][j] { 1.0 } else { -COLLISION_COST };
+    let mut best = (0.0, None);
+    for top in 0..free.len() {
+        let mut columns = vec![0.0; free[top].len()];
+        for bottom in top..free.len() {
+            for (j, sum) in columns.iter_mut().enumerate() {
+                *sum += value(bottom, j);
+            }
+            for left in 0..columns.len() {
+                let mut sum = 0.0;
+                for (right, column) in columns.iter().enumerate().skip(left) {
+                    sum += column;
+                    if sum > best.0 {
+                        best = (sum, Some([(top, bottom), (left, right)]));
+                    }
+                }
+            }
+        }
+    }
+    best.1
 }
 
 /// Postures of the closing joints before closing around cylinders; the straight way from open to where the sides meet
@@ -313,4 +353,25 @@ fn fan_direction(anatomy: &Anatomy<'_>, motion: &Motion, still: &BTreeSet<usize>
             .map(|j| if still.contains(&j) { direction(j) } else { 0.0 })
             .collect(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::best_block;
+
+    #[test]
+    fn the_block_leaves_out_what_collides() {
+        let rows = ["####....", "####....", "#.......", "........"];
+        let free: Vec<Vec<bool>> = rows
+            .iter()
+            .map(|r| r.chars().map(|c| c == '.').collect())
+            .collect();
+        // Four rows of four, or two rows of seven and eight: 16 against 15 less one collision.
+        assert_eq!(best_block(&free), Some([(0, 3), (4, 7)]));
+        assert_eq!(best_block(&[vec![false; 3], vec![false; 3]]), None);
+        assert_eq!(
+            best_block(&[vec![true; 2], vec![true; 2]]),
+            Some([(0, 1), (0, 1)])
+        );
+    }
 }
