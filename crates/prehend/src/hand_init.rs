@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
-use prehend_hand::{Hand, Proposal};
+use prehend_hand::{Hand, Proposal, urdf_below};
 
 use crate::hand_folder::{read_hand, resource};
 use crate::{Error, files};
@@ -27,13 +27,14 @@ pub struct HandFolder {
 /// its meshes stay as they are.
 ///
 /// Meshes go under `meshes/`, in the folders in which they stood, and the URDF's copy names them there. A URDF without
-/// any `<collision>` gets its `<visual>` shapes as such.
+/// any `<collision>` gets its `<visual>` shapes as such. The hand is what hangs on the link `root`; where none is given
+/// and an arm is below the palm, the hand without the arm ([`Hand::base_of_hand`]).
 ///
 /// # Errors
 ///
-/// What [`Hand::from_urdf`] and [`Hand::propose_description`] say, with the file; a folder that has a `hand.toml`
+/// What [`urdf_below`], [`Hand::from_urdf`] and [`Hand::propose_description`] say, with the file; a folder that has a `hand.toml`
 /// already, unless `force` is set; a file that cannot be written.
-pub fn init(urdf: &Path, out: &Path, force: bool) -> Result<HandFolder, Error> {
+pub fn init(urdf: &Path, out: &Path, root: Option<&str>, force: bool) -> Result<HandFolder, Error> {
     let toml_path = out.join("hand.toml");
     if toml_path.exists() && !force {
         return Err(Error::file(
@@ -43,6 +44,10 @@ pub fn init(urdf: &Path, out: &Path, force: bool) -> Result<HandFolder, Error> {
     }
     let mut notes = Vec::new();
     let mut text = files::read_text(urdf)?;
+    let below = |text: &str, link: &str| urdf_below(text, link).map_err(|e| Error::file(urdf, e));
+    if let Some(link) = root {
+        text = below(&text, link)?;
+    }
     if !has_element(&text, "collision") && has_element(&text, "visual") {
         text = with_visuals_as_collisions(&text);
         notes.push(
@@ -58,7 +63,21 @@ pub fn init(urdf: &Path, out: &Path, force: bool) -> Result<HandFolder, Error> {
         read.borrow_mut().insert(name.to_owned(), (file, bytes.clone()));
         Ok(bytes)
     };
-    let hand = Hand::from_urdf(&text, &resolve).map_err(|e| Error::file(urdf, e))?;
+    let mut hand = Hand::from_urdf(&text, &resolve).map_err(|e| Error::file(urdf, e))?;
+    let base = match root {
+        Some(_) => hand.root(),
+        None => hand.base_of_hand().map_err(|e| Error::file(urdf, e))?,
+    };
+    let is_part = root.is_some() || base != hand.root();
+    if base != hand.root() {
+        let (link, n_joints) = (hand.link(base).name.clone(), hand.joints_to(base).len());
+        text = below(&text, &link)?;
+        read.borrow_mut().clear();
+        hand = Hand::from_urdf(&text, &resolve).map_err(|e| Error::file(urdf, e))?;
+        notes.push(format!(
+            "the arm ({n_joints} joints) is left out: the hand begins at link `{link}`; to begin elsewhere, give --root LINK"
+        ));
+    }
     notes.extend(hand.warnings().iter().cloned());
     let proposal = hand.propose_description().map_err(|e| Error::file(urdf, e))?;
 
@@ -73,6 +92,12 @@ pub fn init(urdf: &Path, out: &Path, force: bool) -> Result<HandFolder, Error> {
         _ => false,
     };
     if in_place {
+        if is_part {
+            return Err(Error::file(
+                urdf,
+                "has more than the hand and stands in the folder to be written; give another --out for a copy of the hand alone",
+            ));
+        }
         if !has_element(&files::read_text(urdf)?, "collision") {
             return Err(Error::file(
                 urdf,

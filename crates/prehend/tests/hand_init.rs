@@ -40,7 +40,7 @@ fn the_folder_written_can_be_moved_and_is_not_overwritten_unasked() {
     let root = tempfile::tempdir().unwrap();
     let urdf = package(&root.path().join("source"), "collision");
     let out = root.path().join("hands/jaws");
-    let made = init(&urdf, &out, false).unwrap();
+    let made = init(&urdf, &out, None, false).unwrap();
     assert_eq!(made.files, ["hand.toml", "jaws.urdf", "meshes/jaw.off"]);
     // Moved, and the source gone.
     fs::remove_dir_all(root.path().join("source")).unwrap();
@@ -51,14 +51,14 @@ fn the_folder_written_can_be_moved_and_is_not_overwritten_unasked() {
 
     let urdf = moved.join("jaws.urdf");
     let before = fs::read(moved.join("hand.toml")).unwrap();
-    let refused = init(&urdf, &moved, false).unwrap_err().to_string();
+    let refused = init(&urdf, &moved, None, false).unwrap_err().to_string();
     assert!(
         refused.ends_with("hand.toml: is there already; give another --out, or --force to write a new one"),
         "{refused}"
     );
     // In place, URDF and meshes stay.
     let text = fs::read(&urdf).unwrap();
-    let again = init(&urdf, &moved, true).unwrap();
+    let again = init(&urdf, &moved, None, true).unwrap();
     assert_eq!(again.files, ["hand.toml"]);
     assert_eq!(
         (
@@ -73,7 +73,7 @@ fn the_folder_written_can_be_moved_and_is_not_overwritten_unasked() {
 fn pictures_serve_as_shapes_where_a_urdf_has_no_others() {
     let root = tempfile::tempdir().unwrap();
     let urdf = package(root.path(), "visual");
-    let made = init(&urdf, &root.path().join("out"), false).unwrap();
+    let made = init(&urdf, &root.path().join("out"), None, false).unwrap();
     assert!(
         made.notes[0].starts_with("no link has a <collision>"),
         "{:?}",
@@ -89,7 +89,7 @@ fn a_missing_mesh_is_named_and_nothing_is_written() {
     let urdf = package(root.path(), "collision");
     fs::remove_file(root.path().join("jaws/meshes/visual/jaw.off")).unwrap();
     let out = root.path().join("out");
-    let error = init(&urdf, &out, false).unwrap_err().to_string();
+    let error = init(&urdf, &out, None, false).unwrap_err().to_string();
     assert!(
         error.contains("jaws.urdf: link `left`: mesh `package://jaws/meshes/visual/jaw.off` cannot be had: "),
         "{error}"
@@ -111,7 +111,7 @@ fn shared_hands_come_out_whole() {
         "schunk_sdh/schunk_sdh.urdf",
     ] {
         let out = root.path().join(urdf.split('/').next().unwrap());
-        init(&Path::new(SHARED).join(urdf), &out, false).unwrap();
+        init(&Path::new(SHARED).join(urdf), &out, None, false).unwrap();
         let hand = read_described_hand(&out).unwrap();
         assert_eq!(hand.warnings(), [] as [&str; 0], "{urdf}");
     }

@@ -52,6 +52,11 @@ struct InitArguments {
     #[arg(long)]
     out: PathBuf,
 
+    /// The link that the hand begins with, where the URDF has more than a hand and this is not found [an arm of more
+    /// than two joints below the palm is left out]
+    #[arg(long, value_name = "LINK")]
+    root: Option<String>,
+
     /// Write hand.toml anew where the folder has one
     #[arg(long)]
     force: bool,
@@ -59,7 +64,7 @@ struct InitArguments {
 
 impl InitArguments {
     fn run(self, json: bool) -> Result<Outcome> {
-        let made = init(&self.urdf, &self.out, self.force)?;
+        let made = init(&self.urdf, &self.out, self.root.as_deref(), self.force)?;
         let guesses: Vec<Value> = made
             .proposal
             .guesses
