@@ -46,6 +46,14 @@ impl Column {
         }
     }
 
+    /// A column of this kind without values.
+    fn missing(&self, n: usize) -> Self {
+        match self {
+            Self::Number(_) | Self::Integer(_) => Self::Number(vec![f64::NAN; n]),
+            Self::Text(_) => Self::Text(vec![None; n]),
+        }
+    }
+
     fn append(&mut self, other: &Self) {
         match (&mut *self, other) {
             (Self::Number(a), Self::Number(b)) => a.extend(b),
@@ -190,6 +198,36 @@ impl Frame {
         }
     }
 
+    /// Appends the rows of another frame and keeps the columns of both: cells that a row has none for are missing.
+    pub fn append_all(&mut self, other: &Self) {
+        let (n, more) = (self.n_rows(), other.n_rows());
+        for (name, column) in &mut self.columns {
+            match other.column(name) {
+                Some(theirs) => column.append(theirs),
+                None => column.append(&column.missing(more)),
+            }
+        }
+        for (name, column) in &other.columns {
+            if self.column(name).is_none() {
+                let mut whole = column.missing(n);
+                whole.append(column);
+                self.columns.push((name.clone(), whole));
+            }
+        }
+    }
+
+    /// The columns that have a value in some row.
+    #[must_use]
+    pub fn without_empty_columns(&self) -> Self {
+        let mut kept = self.clone();
+        kept.columns.retain(|(_, column)| match column {
+            Column::Number(v) => v.iter().any(|x| !x.is_nan()),
+            Column::Integer(v) => !v.is_empty(),
+            Column::Text(v) => v.iter().any(Option::is_some),
+        });
+        kept
+    }
+
     /// Reads a table by its extension: `.parquet`, `.csv`, `.jsonl`; `-` is CSV on standard input.
     ///
     /// # Errors
@@ -317,5 +355,30 @@ mod tests {
         a.append(&b);
         assert_eq!(a.n_rows(), 4);
         assert!(a.column("name").is_none());
+    }
+
+    #[test]
+    fn appending_all_leaves_cells_that_nobody_has_missing() {
+        let mut a = sample();
+        let mut b = Frame::new();
+        b.push("n", Column::Integer(vec![7]));
+        b.push("z", Column::Integer(vec![8]));
+        let columns = a.columns().len();
+        a.append_all(&b);
+        assert_eq!((a.n_rows(), a.columns().len()), (4, columns + 1));
+        let Some(Column::Text(names)) = a.column("name") else {
+            panic!("name is text");
+        };
+        assert_eq!(names[3], None);
+        assert!(a.numbers("x").unwrap()[3].is_nan() && a.numbers("z").unwrap()[0].is_nan());
+        assert_eq!(
+            (a.numbers("n").unwrap()[3], a.numbers("z").unwrap()[3]),
+            (7.0, 8.0)
+        );
+        // The last row alone has no name and no x.
+        assert_eq!(a.select(&[3]).without_empty_columns().columns().len(), 2);
+        let mut empty = Frame::new();
+        empty.append_all(&a.select(&[0, 1, 2]).without_empty_columns());
+        assert_eq!(empty.columns().len(), columns);
     }
 }

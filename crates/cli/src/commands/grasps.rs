@@ -113,7 +113,7 @@ impl Arguments {
 impl Filter {
     /// All tables as one, and the rows that are meant.
     pub fn read(&self, files: &[PathBuf]) -> Result<(Frame, Vec<usize>)> {
-        let frame = read_tables(files)?;
+        let frame = read_tables(files, Frame::append_all)?;
         let rows = self.matching(&frame).with_context(|| listed(files))?;
         Ok((frame, rows))
     }
@@ -192,13 +192,13 @@ pub fn listed(paths: &[PathBuf]) -> String {
         .join(", ")
 }
 
-/// All tables of these files and folders as one; columns that not all have are dropped.
-pub fn read_tables(paths: &[PathBuf]) -> Result<Frame> {
+/// All tables of these files and folders as one.
+pub fn read_tables(paths: &[PathBuf], join: fn(&mut Frame, &Frame)) -> Result<Frame> {
     let mut whole = Frame::new();
     let mut found = 0;
     for path in paths {
         for file in prehend::files::list(path, &["parquet", "csv", "jsonl"])? {
-            whole.append(&Frame::read(&file)?);
+            join(&mut whole, &Frame::read(&file)?);
             found += 1;
         }
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
+use prehend::frame::Frame;
 use prehend::imitation::{Candidate, Scales, Similarity, Weighing, rank_grasps, rank_objects, recognise};
 use prehend::stages::imitate::features;
 use serde_json::{Map, Value, json};
@@ -62,7 +63,7 @@ impl Arguments {
                 self.demonstration
             )));
         };
-        let shown_table = read_tables(&[PathBuf::from(file)])?;
+        let shown_table = read_tables(&[PathBuf::from(file)], Frame::append)?;
         let row = shown_table
             .texts("grasp_id")
             .with_context(|| file.to_owned())?
@@ -72,7 +73,7 @@ impl Arguments {
             .with_context(|| format!("{file}: no grasp `{grasp_id}`; `prehend grasps {file}` lists them"))?;
         let shown = features(&shown_table).with_context(|| file.to_owned())?[row];
 
-        let table = read_tables(&self.candidates)?;
+        let table = read_tables(&self.candidates, Frame::append)?;
         let all = features(&table).with_context(|| listed(&self.candidates))?;
         let (ids, names) = (table.texts("grasp_id")?, table.texts("object")?);
         let candidates: Vec<Candidate> = (0..table.n_rows())

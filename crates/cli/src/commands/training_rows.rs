@@ -42,7 +42,8 @@ pub struct TrainingRows {
 impl TrainingRows {
     /// All rows, with their labels. `asks_for_task`: there is a node `task` to learn.
     pub fn read(&self, asks_for_task: bool) -> Result<Frame> {
-        let frame = read_tables(&self.data)?;
+        // Columns that not all tables have are dropped: joints differ by hand.
+        let frame = read_tables(&self.data, Frame::append)?;
         if let Some(labels) = &self.labels {
             if !labels.is_file() {
                 bail!(Usage(format!("--labels {}: no such file", labels.display())));
