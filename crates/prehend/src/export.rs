@@ -4,7 +4,7 @@
 //! in and closed, and it squeezes. Poses are those of the hand's root link in the object's frame.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
-use prehend_hand::{Hand, JointKind, JointPositions};
+use prehend_hand::{Hand, JointIdx, JointPositions};
 use serde_json::{Map, Value, json};
 
 use crate::Error;
@@ -12,20 +12,18 @@ use crate::frame::Frame;
 use crate::grasp_table::{GraspRecord, records};
 
 mod mjcf;
+mod part;
 mod pieces;
+mod squeeze;
 mod yaml;
 
 pub use mjcf::{ServoGains, mjcf_scene};
 pub use pieces::{Pieces, convex_pieces};
+pub use squeeze::{GRIP, IMBALANCE, Squeeze, squeeze};
 pub use yaml::{isaac_yaml, moveit_yaml};
 
 /// How far (m) the hand stands off before it comes in.
 pub const STAND_OFF: f64 = 0.1;
-/// How far beyond touching the closing joints are sent to squeeze: rad, or m for joints that slide.
-pub const SQUEEZE: f64 = 0.15;
-/// The same for joints that slide, metres.
-pub const SQUEEZE_SLIDE: f64 = 0.005;
-
 /// A grasp with what leads to it and what follows.
 #[derive(Debug, Clone)]
 pub struct ExportedGrasp {
@@ -37,43 +35,34 @@ pub struct ExportedGrasp {
     pub object_from_pregrasp: Isometry3<f64>,
     /// Unit direction in which it comes in: the palm's z, object frame.
     pub approach: Vector3<f64>,
-    /// Where the joints are sent to squeeze: beyond touching, within the limits.
-    pub squeeze: JointPositions,
+    /// What the joints do to squeeze.
+    pub squeeze: Squeeze,
 }
 
 /// The grasps of a table that belong to this hand, with pre-grasp and squeeze.
 ///
 /// # Errors
 ///
-/// As [`records`]; [`Error`] where the hand has no description or the table no `egpc` columns.
-pub fn exported(frame: &Frame, hand: &Hand) -> Result<Vec<ExportedGrasp>, Error> {
-    let description = hand
-        .description()
-        .ok_or_else(|| Error::input(format!("the hand {} has no hand.toml", hand.name())))?;
+/// As [`records`] and [`squeeze`]; [`Error`] where the table has no `egpc` columns.
+pub fn exported(frame: &Frame, hand: &Hand, gains: &ServoGains) -> Result<Vec<ExportedGrasp>, Error> {
     let egpc = [frame.numbers("egpc_1")?, frame.numbers("egpc_2")?];
     let records = records(frame, hand)?;
-    Ok(records
+    records
         .into_iter()
         .enumerate()
         .map(|(row, record)| {
             let preshape = hand.preshape([egpc[0][row], egpc[1][row]]);
             let object_from_palm = record.object_from_root * hand.root_from_palm(&record.joints);
             let approach = object_from_palm * Vector3::z();
-            let mut squeeze = record.joints.as_slice().to_vec();
-            for closing in &description.closing {
-                let slides = hand.joint(closing.joint).kind == JointKind::Prismatic;
-                let by = if slides { SQUEEZE_SLIDE } else { SQUEEZE };
-                squeeze[closing.joint.0] += closing.speed.signum() * by;
-            }
-            ExportedGrasp {
+            Ok(ExportedGrasp {
                 object_from_pregrasp: Translation3::from(-approach * STAND_OFF) * record.object_from_root,
-                squeeze: hand.joint_positions_from_slice(&squeeze),
+                squeeze: squeeze(hand, &record, gains)?,
                 preshape,
                 approach,
                 record,
-            }
+            })
         })
-        .collect())
+        .collect()
 }
 
 /// One grasp as JSON: poses with `translation` (m) and `quaternion_wxyz`, joints by name, contacts, ε.
@@ -90,7 +79,7 @@ pub fn grasp_json(hand: &Hand, grasp: &ExportedGrasp) -> Value {
         },
         "pose": pose_json(&grasp.record.object_from_root),
         "joints": joints(&grasp.record.joints),
-        "squeeze": { "joints": joints(&grasp.squeeze) },
+        "squeeze": squeeze_json(hand, &grasp.squeeze),
         "epsilon": grasp.record.epsilon,
         "contacts": grasp.record.contact_records,
     })
@@ -104,9 +93,40 @@ fn pose_json(pose: &Isometry3<f64>) -> Value {
     json!({ "translation": [t.x, t.y, t.z], "quaternion_wxyz": [w, x, y, z] })
 }
 
-/// Positions of the joints that move freely, by name.
-fn free_joints(hand: &Hand, positions: &JointPositions) -> Map<String, Value> {
-    hand.free_joints()
+/// Efforts in N·m, or N of joints that slide; forces on the object, N. `forces` is null where the contacts cannot balance.
+fn squeeze_json(hand: &Hand, squeeze: &Squeeze) -> Value {
+    let by_name = |values: &[f64]| -> Value {
+        let named = driven_joints(hand).map(|j| (hand.joint(j).name.clone(), json!(values[j.0])));
+        Value::Object(named.collect())
+    };
+    let forces = squeeze.forces.as_ref().map(|f| {
+        let of_contact = f
+            .forces
+            .iter()
+            .map(|c| json!({ "force": c.force.as_slice(), "torsion": c.torsion }));
+        of_contact.collect::<Vec<_>>()
+    });
+    json!({
+        "joints": hand.positions_by_name(&squeeze.joints),
+        "targets": by_name(&squeeze.targets),
+        "efforts": by_name(&squeeze.efforts),
+        "balanced": squeeze.forces.is_some(),
+        "imbalance": squeeze.forces.as_ref().map(|f| f.imbalance),
+        "grip": squeeze.grip,
+        "forces": forces,
+    })
+}
+
+/// The joints that have a place of their own: free ones, and those whose coupling lets go.
+fn driven_joints(hand: &Hand) -> impl Iterator<Item = JointIdx> + '_ {
+    let let_go = hand.description().map_or(&[][..], |d| &d.break_away);
+    let driven = |j: &JointIdx| hand.joint(*j).mimic.is_none() || let_go.contains(j);
+    (0..hand.joints().len()).map(JointIdx).filter(driven)
+}
+
+/// Positions of the driven joints by name.
+fn driven_positions(hand: &Hand, positions: &JointPositions) -> Map<String, Value> {
+    driven_joints(hand)
         .map(|j| (hand.joint(j).name.clone(), json!(positions.get(j))))
         .collect()
 }

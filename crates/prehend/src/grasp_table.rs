@@ -191,6 +191,10 @@ pub struct GraspRecord {
     pub contact_records: Vec<ContactRecord>,
     /// ε of the grasp.
     pub epsilon: f64,
+    /// The point that torques are taken about, object frame, m.
+    pub wrench_center: Point3<f64>,
+    /// The length that they are divided by, m.
+    pub torque_scale: f64,
 }
 
 /// The grasps of a table that belong to `hand`.
@@ -211,6 +215,12 @@ pub fn records(frame: &Frame, hand: &Hand) -> Result<Vec<GraspRecord>, Error> {
         .collect::<Result<_, _>>()?;
     let contacts = frame.texts("contacts")?;
     let epsilon = frame.numbers("qeps")?;
+    let center = [
+        frame.numbers("center_x")?,
+        frame.numbers("center_y")?,
+        frame.numbers("center_z")?,
+    ];
+    let torque_scale = frame.numbers("torque_scale")?;
     (0..frame.n_rows())
         .map(|row| {
             let at = |k: usize| pose[k][row];
@@ -238,6 +248,8 @@ pub fn records(frame: &Frame, hand: &Hand) -> Result<Vec<GraspRecord>, Error> {
                 contacts: contact_records.iter().map(|c| c.link_and_point(hand)).collect::<Result<_, _>>()?,
                 contact_records,
                 epsilon: epsilon[row],
+                wrench_center: Point3::from([0, 1, 2].map(|k: usize| center[k][row])),
+                torque_scale: torque_scale[row],
             })
         })
         .collect()

@@ -9,7 +9,7 @@ use prehend::files;
 use prehend::frame::Frame;
 use prehend::hand_folder::read_described_hand;
 use prehend::object::{Object, ObjectOptions};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::grasps::Filter;
 use crate::output::{self, Outcome};
@@ -65,17 +65,27 @@ impl Arguments {
                 .or_default()
                 .push(row);
         }
-        let (mut written, mut deviations) = (Vec::new(), BTreeMap::new());
-        let mut n_grasps = 0;
+        let (mut written, mut deviations) = (Vec::new(), Map::new());
+        let (mut n_grasps, mut unbalanced) = (0, 0);
         for ((hand, mesh), rows) in groups {
             n_grasps += rows.len();
-            let table = frame.select(&rows);
-            let made = self.group(&table, Path::new(&hand), Path::new(&mesh), &mut deviations);
+            // Joints of other hands are not of this group.
+            let table = frame.select(&rows).without_empty_columns();
+            let made = self.group(
+                &table,
+                Path::new(&hand),
+                Path::new(&mesh),
+                &mut deviations,
+                &mut unbalanced,
+            );
             written.extend(made.with_context(|| format!("grasps of {hand} on {mesh}"))?);
         }
         let mut answer = json!({ "grasps": n_grasps, "files": written });
+        if self.format != Format::Csv {
+            answer["unbalanced"] = json!(unbalanced);
+        }
         if self.format == Format::Mjcf {
-            answer["volume_deviation"] = json!(deviations);
+            answer["pieces"] = Value::Object(deviations);
         }
         output::answer(json, &answer, text)?;
         Ok(Outcome::Done)
@@ -86,7 +96,8 @@ impl Arguments {
         table: &Frame,
         hand: &Path,
         mesh: &Path,
-        deviations: &mut BTreeMap<String, f64>,
+        deviations: &mut Map<String, Value>,
+        unbalanced: &mut usize,
     ) -> Result<Vec<String>> {
         let object = &table.texts("object")?[0];
         let name = format!("{}_{object}", table.texts("hand")?[0]);
@@ -101,7 +112,8 @@ impl Arguments {
             return Ok(written);
         }
         let hand = read_described_hand(hand)?;
-        let grasps = exported(table, &hand)?;
+        let grasps = exported(table, &hand, &ServoGains::default())?;
+        *unbalanced += grasps.iter().filter(|g| g.squeeze.forces.is_none()).count();
         match self.format {
             Format::Json => {
                 let list: Vec<Value> = grasps.iter().map(|g| grasp_json(&hand, g)).collect();
@@ -121,7 +133,12 @@ impl Arguments {
             Format::Mjcf => {
                 let body = Object::read(mesh, ObjectOptions::default())?;
                 let pieces = convex_pieces(&body.mesh);
-                deviations.insert(object.clone(), pieces.volume_deviation);
+                let figures = json!({
+                    "count": pieces.pieces.len(),
+                    "volume_deviation": pieces.volume_deviation,
+                    "surface_deviation": pieces.surface_deviation,
+                });
+                deviations.insert(object.clone(), figures);
                 for grasp in &grasps {
                     let scene = mjcf_scene(&hand, &body, &pieces, grasp, ServoGains::default())?;
                     let id = grasp.record.grasp_id.replace(['/', '\\'], "_");
@@ -140,9 +157,17 @@ fn text(answer: &Value) -> String {
         answer["grasps"],
         answer["files"].as_array().map_or(0, Vec::len)
     );
-    for (object, deviation) in answer["volume_deviation"].as_object().into_iter().flatten() {
-        let percent = 100.0 * deviation.as_f64().unwrap_or(0.0);
-        out += &format!("  {object}: convex pieces have {percent:.1} % more volume than the mesh\n");
+    if let Some(n @ 1..) = answer["unbalanced"].as_u64() {
+        out += &format!("  {n} of them: contact forces cannot balance; all closing joints squeeze alike\n");
+    }
+    for (object, figures) in answer["pieces"].as_object().into_iter().flatten() {
+        let number = |key: &str| figures[key].as_f64().unwrap_or(0.0);
+        out += &format!(
+            "  {object}: {} convex pieces, {:.1} % more volume than the mesh, up to {:.2} mm off it\n",
+            figures["count"],
+            100.0 * number("volume_deviation"),
+            1000.0 * number("surface_deviation")
+        );
     }
     out
 }

@@ -10,8 +10,8 @@ use prehend_quality::{Material, friction_coefficient, soft_torsion_default};
 use quick_xml::Writer;
 use quick_xml::events::{BytesEnd, BytesStart, Event};
 
-use super::ExportedGrasp;
 use super::pieces::{Pieces, corners};
+use super::{ExportedGrasp, driven_joints};
 use crate::{Error, Object};
 
 /// Mass (kg) of a link whose URDF gives none.
@@ -35,7 +35,7 @@ pub struct ServoGains {
 }
 
 impl Default for ServoGains {
-    /// A squeeze of 0.15 rad presses with 0.75 N·m, about 10 N at a fingertip; sliding jaws press with 25 N.
+    /// 1 N at a fingertip 70 mm off turns its joint by 14 mrad; sliding jaws give way by 0.2 mm per N.
     fn default() -> Self {
         Self {
             turning: 5.0,
@@ -46,9 +46,10 @@ impl Default for ServoGains {
     }
 }
 
-/// One grasp as MJCF: the hand in its final posture with position servos on its free joints, its root fixed in the
+/// One grasp as MJCF: the hand in its final posture with position servos on its joints, its root fixed in the
 /// world (the object's frame); the object free, as convex pieces. Touch is by explicit pairs of links and pieces only,
-/// with the friction of their materials; a soft contact's torsion length times μ is MuJoCo's torsional friction.
+/// with the friction of their materials; a soft contact's torsion length times μ is MuJoCo's torsional friction. A joint
+/// whose coupling lets go has a servo of its own.
 ///
 /// The keyframe `grasp` puts the hand into its posture and sends the servos to the squeeze.
 ///
@@ -128,9 +129,10 @@ pub fn mjcf_scene(
     }
     scene.close("contact");
 
+    let driven: Vec<String> = driven_joints(hand).map(|j| hand.joint(j).name.clone()).collect();
     scene.open("equality", &[]);
     for joint in hand.joints() {
-        if let Some(mimic) = joint.mimic {
+        if let Some(mimic) = joint.mimic.filter(|_| !driven.contains(&joint.name)) {
             scene.empty(
                 "joint",
                 &[
@@ -144,7 +146,7 @@ pub fn mjcf_scene(
     scene.close("equality");
 
     scene.open("actuator", &[]);
-    for joint in hand.free_joints() {
+    for joint in driven_joints(hand) {
         let slides = hand.joint(joint).kind == JointKind::Prismatic;
         let (stiffness, most) = if slides {
             (gains.sliding, gains.most_force)
@@ -167,13 +169,16 @@ pub fn mjcf_scene(
         order.map(|j| of.get(j).to_string()).collect::<Vec<_>>().join(" ")
     };
     let qpos = positions(&mut scene.joint_order.clone().into_iter(), &grasp.record.joints);
+    let targets: Vec<String> = driven_joints(hand)
+        .map(|j| grasp.squeeze.targets[j.0].to_string())
+        .collect();
     scene.open("keyframe", &[]);
     scene.empty(
         "key",
         &[
             ("name", "grasp".into()),
             ("qpos", format!("0 0 0 1 0 0 0 {qpos}")),
-            ("ctrl", positions(&mut hand.free_joints(), &grasp.squeeze)),
+            ("ctrl", targets.join(" ")),
         ],
     );
     scene.close("keyframe");

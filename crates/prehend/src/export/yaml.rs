@@ -4,14 +4,14 @@ use nalgebra::{Isometry3, Vector3};
 use prehend_hand::{Hand, JointPositions};
 use serde_json::{Map, Value, json};
 
-use super::{ExportedGrasp, STAND_OFF, free_joints};
+use super::{ExportedGrasp, STAND_OFF, driven_joints, driven_positions};
 use crate::Error;
 
 /// The grasps as a YAML list of `moveit_msgs/Grasp`.
 ///
 /// `grasp_pose` is the root link's pose in the frame `object`, `pre_grasp_approach` and `post_grasp_retreat` lead along
 /// the palm's z by [`STAND_OFF`]; `pre_grasp_posture` is the pre-shape, `grasp_posture` two points: touching, then
-/// squeezing. `grasp_quality` is ε.
+/// squeezing with `effort` (N·m, or N). `grasp_quality` is ε.
 ///
 /// # Errors
 ///
@@ -19,13 +19,21 @@ use crate::Error;
 pub fn moveit_yaml(hand: &Hand, object: &str, grasps: &[ExportedGrasp]) -> Result<String, Error> {
     let root = hand.link(hand.root()).name.as_str();
     let header = |frame: &str| json!({ "frame_id": frame });
-    let names: Vec<&str> = hand.free_joints().map(|j| hand.joint(j).name.as_str()).collect();
-    let postures = |points: &[&JointPositions]| {
+    let names: Vec<&str> = driven_joints(hand).map(|j| hand.joint(j).name.as_str()).collect();
+    let none = vec![0.0; hand.joints().len()];
+    let postures = |points: &[(&JointPositions, &[f64])]| {
         let points: Vec<Value> = (1..)
             .zip(points)
-            .map(|(second, positions)| {
-                let values: Vec<f64> = hand.free_joints().map(|j| positions.get(j)).collect();
-                json!({ "positions": values, "time_from_start": { "sec": second, "nanosec": 0 } })
+            .map(|(second, (positions, efforts))| {
+                let positions: Vec<f64> = driven_joints(hand).map(|j| positions.get(j)).collect();
+                let efforts: Vec<f64> = driven_joints(hand).map(|j| efforts[j.0]).collect();
+                json!({
+                    "positions": positions,
+                    "velocities": [],
+                    "accelerations": [],
+                    "effort": efforts,
+                    "time_from_start": { "sec": second, "nanosec": 0 },
+                })
             })
             .collect();
         json!({ "header": header(root), "joint_names": names, "points": points })
@@ -42,8 +50,11 @@ pub fn moveit_yaml(hand: &Hand, object: &str, grasps: &[ExportedGrasp]) -> Resul
         .map(|grasp| {
             json!({
                 "id": grasp.record.grasp_id,
-                "pre_grasp_posture": postures(&[&grasp.preshape]),
-                "grasp_posture": postures(&[&grasp.record.joints, &grasp.squeeze]),
+                "pre_grasp_posture": postures(&[(&grasp.preshape, &none)]),
+                "grasp_posture": postures(&[
+                    (&grasp.record.joints, &none),
+                    (&grasp.squeeze.joints, &grasp.squeeze.efforts),
+                ]),
                 "grasp_pose": { "header": header(object), "pose": pose(&grasp.record.object_from_root) },
                 "grasp_quality": grasp.record.epsilon,
                 "pre_grasp_approach": translation(grasp.approach),
@@ -83,8 +94,8 @@ pub fn isaac_yaml(hand: &Hand, object: &str, grasps: &[ExportedGrasp]) -> Result
                 "confidence": confidence,
                 "position": [t.x, t.y, t.z],
                 "orientation": { "w": q.w, "xyz": [q.i, q.j, q.k] },
-                "cspace_position": free_joints(hand, &grasp.record.joints),
-                "pregrasp_cspace_position": free_joints(hand, &grasp.preshape),
+                "cspace_position": driven_positions(hand, &grasp.record.joints),
+                "pregrasp_cspace_position": driven_positions(hand, &grasp.preshape),
             });
             (grasp.record.grasp_id.clone(), entry)
         })
@@ -104,7 +115,8 @@ fn text(value: &Value) -> Result<String, Error> {
 }
 
 fn xyz(v: &Vector3<f64>) -> Value {
-    json!({ "x": v.x, "y": v.y, "z": v.z })
+    // Adding 0 turns −0 into 0.
+    json!({ "x": v.x + 0.0, "y": v.y + 0.0, "z": v.z + 0.0 })
 }
 
 fn pose(pose: &Isometry3<f64>) -> Value {
