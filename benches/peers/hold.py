@@ -2,6 +2,7 @@
 
     pip install mujoco==4.0.0
     python hold.py SCENE.xml… > outcomes.jsonl
+    python hold.py --table GRASPS.jsonl outcomes.jsonl…      # GRASPS.jsonl from `prehend grasps`: holding by epsilon
 
 The servos close from the grasp's posture towards the squeeze for half a second without gravity, then gravity pulls for
 half a second from each of six directions, each time from the squeezed state anew. A grasp holds in a direction where the
@@ -11,6 +12,7 @@ standard error.
 
 import json
 import sys
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -50,20 +52,52 @@ def play(path):
     }
 
 
-def main():
-    outcomes = []
-    for path in sys.argv[1:]:
-        outcomes.append(play(path))
-        print(json.dumps(outcomes[-1]), flush=True)
+def summary(outcomes):
     n = max(len(outcomes), 1)
     every = sum(all(o["held"]) for o in outcomes)
     directions = sum(sum(o["held"]) for o in outcomes)
     lost = sum(o["moved_by_squeeze"] >= MOVED for o in outcomes)
-    print(
+    return (
         f"{len(outcomes)} grasps: {every} ({100 * every / n:.0f} %) hold in all six directions, "
-        f"{100 * directions / (6 * n):.0f} % of grasps and directions; {lost} lost by the squeeze alone",
-        file=sys.stderr,
+        f"{100 * directions / (6 * n):.0f} % of grasps and directions; {lost} lost by the squeeze alone"
     )
+
+
+def table(grasps, files):
+    epsilon, place = {}, {}
+    for text in open(grasps):
+        row = json.loads(text)
+        epsilon[row["grasp_id"].replace("/", "_")] = row["qeps"]
+        place[row["grasp_id"].replace("/", "_")] = f"{row['hand']}, {row['object']}"
+    outcomes = [json.loads(text) for file in files for text in open(file)]
+    for o in outcomes:
+        o["epsilon"], o["place"] = epsilon[Path(o["scene"]).stem], place[Path(o["scene"]).stem]
+    print(summary(outcomes))
+    for name in sorted(set(o["place"] for o in outcomes)):
+        print(f"  {name}: {summary([o for o in outcomes if o['place'] == name])}")
+    for low, high in ((0, 0.02), (0.02, 0.05), (0.05, 0.1), (0.1, 9)):
+        these = [all(o["held"]) for o in outcomes if low <= o["epsilon"] < high]
+        print(f"  epsilon {low} to {high}: {len(these)} grasps, {100 * np.mean(these) if these else 0:.0f} % hold")
+    held = np.array([all(o["held"]) for o in outcomes])
+    e = np.array([o["epsilon"] for o in outcomes])
+    wins = (e[held][:, None] > e[~held]).mean() + 0.5 * (e[held][:, None] == e[~held]).mean()
+    print(f"  area under the curve of epsilon against holding: {wins:.2f}")
+    for name, these in (("hold", held), ("fail", ~held)):
+        moved = [o["moved_by_squeeze"] for o, h in zip(outcomes, these) if h]
+        print(f"  those that {name}: moved by the squeeze {1000 * np.median(moved):.1f} mm in the median")
+    directions = np.array([o["held"] for o in outcomes])
+    print(f"  share lost by direction +x +y +z -x -y -z: {np.round(1 - directions.mean(0), 3).tolist()}")
+
+
+def main():
+    if sys.argv[1] == "--table":
+        table(sys.argv[2], sys.argv[3:])
+        return
+    outcomes = []
+    for path in sys.argv[1:]:
+        outcomes.append(play(path))
+        print(json.dumps(outcomes[-1]), flush=True)
+    print(summary(outcomes), file=sys.stderr)
 
 
 main()
