@@ -1,10 +1,12 @@
 //! Which grasps of this hand on this object serve this task?
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use nalgebra::{Isometry3, Translation3};
-use prehend_grasp::{Features, Grasp, GraspObject, Proposal, Reason, SynthesisOptions, synthesize_each};
+use prehend_grasp::{Grasp, GraspObject, Proposal, Reason, SynthesisOptions, synthesize_each};
 use prehend_hand::Hand;
-use prehend_imitation::{evidence, recognise};
-use prehend_model::Model;
+use prehend_imitation::recognise;
+use prehend_model::{BatchQuery, Model};
 
 use crate::Error;
 use crate::files::Fingerprint;
@@ -56,7 +58,7 @@ pub struct Request<'a> {
     /// How many grasps to answer with.
     pub top: usize,
     /// Close only tries drawn from P(A | task, object): each is taken with the probability P(task | object, A) that the
-    /// model gives its action.
+    /// model gives its action, divided by the largest of the first few hundred tries.
     pub proposals: bool,
 }
 
@@ -106,10 +108,26 @@ pub fn plan(
         stream: stream(hand.name(), &shape.object.name),
         ..options.clone()
     };
-    let draw = |proposal: &Proposal| {
-        let chance = chance(model, task_idx, &grasp_object, proposal);
-        uniform(proposal) < chance.unwrap_or(0.0)
+    let chances = Chances::new(model, task_idx, &grasp_object)?;
+    let largest = if proposals {
+        chances.largest(hand, &grasp_object, &options)?
+    } else {
+        1.0
     };
+    if largest <= 0.0 {
+        return Ok(Plan {
+            grasps: Vec::new(),
+            reason: Some(format!(
+                "the model gives `{task}` no chance with any of the first {} tries on this object; plan without --proposals",
+                PILOT * 100
+            )),
+            tried: PILOT * 100,
+            closed: 0,
+            suitable: 0,
+            kept: 0,
+        });
+    }
+    let draw = |proposal: &Proposal| uniform(proposal) * largest < chances.of(proposal);
     let mut grasps = Vec::new();
     let tally = synthesize_each(
         hand,
@@ -170,21 +188,61 @@ pub fn plan(
     })
 }
 
-/// P(task | object, action): what the model says before anything is closed.
-fn chance(model: &Model, task_idx: usize, object: &GraspObject, proposal: &Proposal) -> Option<f64> {
-    let features = Features {
-        size: object.size(),
-        cvex: object.cvex(),
-        egpc: proposal.egpc,
-        upos: proposal.upos,
-        dir: proposal.dir,
-        fvol: 1.0,
-        fvol_union: 1.0,
-        qeps: 0.0,
-    };
-    let evidence = evidence(model, &features, &["size", "cvex", "egpc", "upos", "dir"]).ok()?;
-    let answer = model.query(&["task"], &evidence).ok()?;
-    answer.probabilities("task")?.get(task_idx).copied()
+/// P(task | object, A), compiled for many actions on one object.
+struct Chances<'a> {
+    query: BatchQuery<'a>,
+    task_idx: usize,
+    nodes: Vec<&'static str>,
+    size: [f64; 3],
+    cvex: f64,
+}
+
+/// Tries of which none is closed: a hundred are passed over for each.
+const PILOT: usize = 4;
+
+impl<'a> Chances<'a> {
+    fn new(model: &'a Model, task_idx: usize, object: &GraspObject) -> Result<Self, Error> {
+        let nodes = ["size", "cvex", "egpc", "upos", "dir"];
+        let nodes: Vec<&str> = nodes.into_iter().filter(|n| model.index(n).is_ok()).collect();
+        Ok(Self {
+            query: BatchQuery::new(model, "task", &nodes)?,
+            task_idx,
+            nodes,
+            size: object.size(),
+            cvex: object.cvex(),
+        })
+    }
+
+    /// 0 where the model cannot say.
+    fn of(&self, proposal: &Proposal) -> f64 {
+        let row = self.nodes.iter().flat_map(|node| match *node {
+            "size" => self.size.to_vec(),
+            "cvex" => vec![self.cvex],
+            "egpc" => proposal.egpc.to_vec(),
+            "upos" => proposal.upos.to_vec(),
+            _ => proposal.dir.to_vec(),
+        });
+        let answers = self.query.run(&[row.collect()]);
+        let posterior = answers.into_iter().next().and_then(Result::ok);
+        let chance = posterior.and_then(|p| p.posterior.get(self.task_idx).copied());
+        chance.unwrap_or(0.0)
+    }
+
+    /// The largest among the first few hundred tries, none of which is closed.
+    fn largest(&self, hand: &Hand, object: &GraspObject, options: &SynthesisOptions) -> Result<f64, Error> {
+        // Bits of numbers from 0 to 1 have the order of the numbers.
+        let largest = AtomicU64::new(0);
+        let look = |proposal: &Proposal| {
+            largest.fetch_max(self.of(proposal).max(0.0).to_bits(), Ordering::Relaxed);
+            false
+        };
+        let pilot = SynthesisOptions {
+            tries: PILOT,
+            ..options.clone()
+        };
+        synthesize_each(hand, object, &pilot, Some(&look), &|_| true, &mut |_| true).map_err(Error::input)?;
+        Ok(f64::from_bits(largest.into_inner()))
+    }
 }
 
 /// A number in [0, 1) that every proposal has for itself: the draw does not depend on threads.
