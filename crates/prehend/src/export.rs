@@ -13,11 +13,13 @@ use crate::grasp_table::{GraspRecord, records};
 
 mod mjcf;
 mod part;
+mod picture;
 mod pieces;
 mod squeeze;
 mod yaml;
 
 pub use mjcf::{ServoGains, mjcf_scene};
+pub use picture::grasp_pictures;
 pub use pieces::{Pieces, convex_pieces};
 pub use squeeze::{GRIP, IMBALANCE, Squeeze, squeeze};
 pub use yaml::{isaac_yaml, moveit_yaml};

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use prehend::export::{ServoGains, convex_pieces, exported, grasp_json, isaac_yaml, mjcf_scene, moveit_yaml};
+use prehend::export::{
+    ServoGains, convex_pieces, exported, grasp_json, grasp_pictures, isaac_yaml, mjcf_scene, moveit_yaml,
+};
 use prehend::files;
 use prehend::frame::Frame;
 use prehend::hand_folder::read_described_hand;
@@ -31,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     format: Format,
 
-    /// The folder that gets the files: one for each hand and object, with mjcf one for each grasp
+    /// The folder that gets the files: one for each hand and object, with mjcf one and with png two for each grasp
     #[arg(long)]
     out: PathBuf,
 }
@@ -48,7 +50,12 @@ enum Format {
     Isaac,
     /// Lists of `moveit_msgs/Grasp`
     Moveit,
+    /// Pictures of each grasp, from the front and from the side
+    Png,
 }
+
+/// Pixels along a side of a picture.
+const PICTURE_SIZE: usize = 480;
 
 impl Arguments {
     pub fn run(self, json: bool) -> Result<Outcome> {
@@ -143,6 +150,15 @@ impl Arguments {
                     let scene = mjcf_scene(&hand, &body, &pieces, grasp, ServoGains::default())?;
                     let id = grasp.record.grasp_id.replace(['/', '\\'], "_");
                     write(format!("{id}.xml"), scene.as_bytes())?;
+                }
+            }
+            Format::Png => {
+                let body = Object::read(mesh, ObjectOptions::default())?;
+                for grasp in &grasps {
+                    for picture in grasp_pictures(&hand, &body.mesh, grasp, PICTURE_SIZE)? {
+                        let name = picture.name.replace(['/', '\\'], "_");
+                        write(format!("{name}.png"), &picture.png)?;
+                    }
                 }
             }
             Format::Csv => {}
