@@ -325,6 +325,7 @@ impl Prepared {
             weights,
             ends,
             earlier: earlier.map_or_else(Vec::new, |earlier| earlier.scaled(scale)),
+            kept: std::sync::OnceLock::new(),
         };
         let orders = orders(spec, &rows, n_effective, constant);
         Self {

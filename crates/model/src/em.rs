@@ -5,16 +5,20 @@
 //! ```
 //!
 //! One pass over the rows, in blocks that stay in the cache, gives the log-likelihood and the moments that the M-step
-//! (`moments.rs`) needs; nothing of the size of the data is stored (`em_block.rs`).
+//! (`moments.rs`) needs (`em_block.rs`). Of the size of the data only the products of few rows are stored.
+
+use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
-use crate::em_block::{BLOCK, Gatherer, Stack};
+use crate::em_block::{BLOCK, Gatherer, Stack, products};
 use crate::gaussian::{LOG_TAU, cholesky, solve_lower};
 use crate::moments::{Mixing, Moment, Regression, Settings, log_prior, maximize};
 
 /// What rounding may take from J in one step, in shares of J.
 const ROUNDING: f64 = 1e-7;
+/// Products of rows that are kept from step to step: 16 MB.
+const MOST_KEPT: usize = 2 << 20;
 
 /// Standardised rows: what one mixture is fitted to.
 pub(crate) struct Rows {
@@ -27,6 +31,8 @@ pub(crate) struct Rows {
     pub ends: Vec<usize>,
     /// Moments of each configuration and component over rows that are no longer here; empty for none.
     pub earlier: Vec<Vec<Moment>>,
+    /// What [`Rows::products`] keeps.
+    pub kept: OnceLock<Vec<f64>>,
 }
 
 /// A fit and how it came about.
@@ -51,6 +57,19 @@ impl Rows {
         let m = self.settings.m();
         &self.z[i * m..(i + 1) * m]
     }
+    /// The products of these rows; `None` where all rows' together are too many to keep.
+    fn products(&self, rows: std::ops::Range<usize>) -> Option<&[f64]> {
+        let m = self.settings.m();
+        let t = m * (m + 1) / 2;
+        (self.n() * t <= MOST_KEPT).then(|| {
+            let all = self.kept.get_or_init(|| {
+                let mut all = Vec::with_capacity(self.n() * t);
+                products(&self.z, m, &mut all);
+                all
+            });
+            &all[rows.start * t..rows.end * t]
+        })
+    }
     pub fn total_weight(&self) -> f64 {
         self.weights.iter().sum()
     }
@@ -71,6 +90,7 @@ impl Rows {
                 .map(|&end| rows.partition_point(|&i| i < end))
                 .collect(),
             earlier: Vec::new(),
+            kept: OnceLock::new(),
         }
     }
 }
@@ -131,7 +151,7 @@ pub(crate) fn expect(rows: &Rows, mixing: &Mixing) -> (f64, Vec<Vec<Moment>>) {
                 let weights = &rows.weights[start..start + n];
                 stack.shares(z, n, &mut shares, &mut totals);
                 log_likelihood += totals.iter().zip(weights).map(|(log, w)| log * w).sum::<f64>();
-                gatherer.add(z, weights, &mut shares);
+                gatherer.add(z, rows.products(start..start + n), weights, &mut shares);
             }
             let mut moments = gatherer.finish();
             if let Some(earlier) = rows.earlier.get(cell) {
@@ -175,7 +195,8 @@ pub(crate) fn gather(rows: &Rows, k: usize, share: impl Fn(usize, usize) -> (f64
                     shares.extend(pairs().map(|(i, c)| share(i, c).1));
                 }
                 let z = &rows.z[start * m..(start + n) * m];
-                gatherer.add(z, &rows.weights[start..start + n], &mut shares);
+                let kept = rows.products(start..start + n);
+                gatherer.add(z, kept, &rows.weights[start..start + n], &mut shares);
             }
             gatherer.finish()
         })

@@ -140,7 +140,6 @@ pub(crate) struct Gatherer {
     m: usize,
     n_components: usize,
     latent_sign: bool,
-    transposed: Vec<f64>,
     products: Vec<f64>,
     signed: Vec<f64>,
     packed: Vec<f64>,
@@ -158,8 +157,7 @@ impl Gatherer {
             m,
             n_components,
             latent_sign: settings.latent_sign,
-            transposed: vec![0.0; m * BLOCK],
-            products: vec![0.0; t * BLOCK],
+            products: Vec::new(),
             signed: vec![0.0; both * n_components * BLOCK],
             packed: vec![0.0; t * n_components],
             packed_signed: vec![0.0; both * t * n_components],
@@ -167,19 +165,17 @@ impl Gatherer {
         }
     }
 
-    /// One block. `shares` has those of all rows for the first component, for the second …, and with a latent sign those
-    /// of −y after them; it becomes shares times weights.
-    pub fn add(&mut self, z: &[f64], weights: &[f64], shares: &mut [f64]) {
-        let (n, m, k) = (weights.len(), self.m, self.n_components);
-        let t = m * (m + 1) / 2;
-        for (i, row) in z.chunks_exact(m).enumerate() {
-            for (j, value) in row.iter().enumerate() {
-                self.transposed[j * n + i] = *value;
-            }
+    /// One block of rows. `kept` are their [`products`] where they are known. `shares` has those of all rows for the first
+    /// component, for the second …, and with a latent sign those of −y after them; it becomes shares times weights.
+    pub fn add(&mut self, z: &[f64], kept: Option<&[f64]>, weights: &[f64], shares: &mut [f64]) {
+        let (n, k) = (weights.len(), self.n_components);
+        let t = self.m * (self.m + 1) / 2;
+        if kept.is_none() {
+            self.products.clear();
+            products(z, self.m, &mut self.products);
         }
-        self.arch.dispatch(Products {
-            columns: &self.transposed[..m * n],
-            pairs: &mut self.products[..t * n],
+        let products = kept.unwrap_or(&self.products);
+        self.arch.dispatch(Weigh {
             weights,
             shares,
             signed: &mut self.signed,
@@ -188,7 +184,7 @@ impl Gatherer {
             matmul(
                 MatMut::from_column_major_slice_mut(packed, t, k),
                 Accum::Add,
-                MatRef::from_row_major_slice(&self.products[..t * n], t, n),
+                MatRef::from_column_major_slice(products, t, n),
                 MatRef::from_column_major_slice(&shares[..k * n], n, k),
                 1.0,
                 Par::Seq,
@@ -227,17 +223,23 @@ impl Gatherer {
     }
 }
 
-/// Products of the columns of z, pair by pair, and shares times weights; with a latent sign the shares of y and −y become
-/// their sum, and `signed` their difference.
-struct Products<'a> {
-    columns: &'a [f64],
-    pairs: &'a mut [f64],
+/// Appends the upper triangle of z zᵀ, row after row, of each row.
+pub(crate) fn products(z: &[f64], m: usize, out: &mut Vec<f64>) {
+    for row in z.chunks_exact(m) {
+        for (i, scale) in row.iter().enumerate() {
+            out.extend(row[i..].iter().map(|other| scale * other));
+        }
+    }
+}
+
+/// Shares times weights; with a latent sign the shares of y and −y become their sum, and `signed` their difference.
+struct Weigh<'a> {
     weights: &'a [f64],
     shares: &'a mut [f64],
     signed: &'a mut [f64],
 }
 
-impl WithSimd for Products<'_> {
+impl WithSimd for Weigh<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -246,16 +248,7 @@ impl WithSimd for Products<'_> {
         reason = "part of a loop with the processor's instructions"
     )]
     fn with_simd<S: Simd>(self, _: S) {
-        let n = self.weights.len();
-        let mut out = self.pairs.chunks_exact_mut(n);
-        for (i, a) in self.columns.chunks_exact(n).enumerate() {
-            for (b, out) in self.columns[i * n..].chunks_exact(n).zip(&mut out) {
-                for ((out, a), b) in out.iter_mut().zip(a).zip(b) {
-                    *out = a * b;
-                }
-            }
-        }
-        for part in self.shares.chunks_exact_mut(n) {
+        for part in self.shares.chunks_exact_mut(self.weights.len()) {
             for (share, weight) in part.iter_mut().zip(self.weights) {
                 *share *= weight;
             }

@@ -400,6 +400,7 @@ mod tests {
             weights: vec![1.0; 400],
             ends: vec![400],
             earlier: Vec::new(),
+            kept: std::sync::OnceLock::new(),
         }
     }
 

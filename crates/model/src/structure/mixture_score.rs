@@ -195,6 +195,7 @@ impl MixtureFamily<'_> {
             weights: cell.iter().map(|&i| members.weights[i]).collect(),
             ends,
             earlier: Vec::new(),
+            kept: std::sync::OnceLock::new(),
         }
     }
 }
