@@ -149,14 +149,16 @@ impl Near {
         match self {
             Self::Simple(solid) => solid.distance_to_point(p),
             Self::Hull(planes, surface) => {
-                let height = planes
-                    .iter()
-                    .map(|(n, d)| n.dot(&p.coords) - d)
-                    .fold(f64::NEG_INFINITY, f64::max);
+                let mut height = f64::NEG_INFINITY;
+                for (n, d) in planes {
+                    height = height.max(n.dot(&p.coords) - d);
+                    // Beyond one face by the limit: no other can bring it nearer.
+                    if height >= limit {
+                        return height;
+                    }
+                }
                 if height <= 0.0 {
                     0.0
-                } else if height >= limit {
-                    height
                 } else {
                     surface.distance_to_point(p)
                 }
