@@ -1,9 +1,9 @@
 //! Step 2: which object, and which grasp?
 
 use prehend_grasp::Features;
-use prehend_model::{Evidence, Model};
+use prehend_model::{BatchQuery, Evidence, Model, RowPosterior};
 
-use crate::recognise::{evidence, task_posterior};
+use crate::recognise::{evidence, task_posterior, values};
 use crate::{ImitationError, Scales};
 
 /// Squared distances in units of standard deviations count as at least this: closer than a tenth of a deviation is
@@ -128,21 +128,68 @@ pub fn rank_grasps(
     scales: &Scales,
     weighing: Weighing,
 ) -> Result<Vec<Ranked>, ImitationError> {
-    let scored = grasps
-        .iter()
-        .map(|candidate| {
-            let object = evidence(imitator, &candidate.features, &OBJECT_NODES)?;
-            let action = evidence(imitator, &candidate.features, &ACTION_NODES)?;
-            let all = evidence(imitator, &candidate.features, &ALL_NODES)?;
-            let log_density = log_density_given(imitator, task, &action, &object)?;
-            let distance = scales.squared_action_distance(shown, &candidate.features);
-            Ok((
-                task_posterior(imitator, &all)?.of(task),
-                log_similarity(log_density, distance),
-            ))
+    let state = state(imitator, task)?;
+    let of_object = answers(imitator, grasps, &OBJECT_NODES)?;
+    let of_action = answers(imitator, grasps, &ACTION_NODES)?;
+    let of_all = answers(imitator, grasps, &ALL_NODES)?;
+    let scored = (0..grasps.len())
+        .map(|i| {
+            let log_density = if let (Some(action), Some(object)) =
+                (joint(&of_action[i], state), joint(&of_object[i], state))
+            {
+                action - object
+            } else {
+                // Too small for a probability.
+                let object = evidence(imitator, &grasps[i].features, &OBJECT_NODES)?;
+                let action = evidence(imitator, &grasps[i].features, &ACTION_NODES)?;
+                log_density_given(imitator, task, &action, &object)?
+            };
+            let distance = scales.squared_action_distance(shown, &grasps[i].features);
+            Ok((of_all[i].posterior[state], log_similarity(log_density, distance)))
         })
         .collect::<Result<Vec<_>, ImitationError>>()?;
     weigh(scored, weighing, "grasp")
+}
+
+/// Which of the model's tasks this is.
+fn state(model: &Model, task: &str) -> Result<usize, ImitationError> {
+    Evidence::new().with_state(model, "task", task)?;
+    let states = model.node(model.index("task")?).states();
+    Ok(states.iter().position(|s| s == task).unwrap_or(0))
+}
+
+/// P(T | the named nodes) of every candidate, and the density of these.
+fn answers(
+    model: &Model,
+    candidates: &[Candidate],
+    nodes: &[&str],
+) -> Result<Vec<RowPosterior>, ImitationError> {
+    let Some(first) = candidates.first() else {
+        return Ok(Vec::new());
+    };
+    // Says which node has another dimension than its feature.
+    evidence(model, &first.features, nodes)?;
+    let known = |node: &&(&str, Vec<f64>)| nodes.contains(&node.0) && model.index(node.0).is_ok();
+    let names: Vec<&str> = values(&first.features)
+        .iter()
+        .filter(known)
+        .map(|v| v.0)
+        .collect();
+    let rows: Vec<Vec<f64>> = candidates
+        .iter()
+        .map(|candidate| {
+            let values = values(&candidate.features);
+            values.iter().filter(known).flat_map(|v| v.1.clone()).collect()
+        })
+        .collect();
+    let answers = BatchQuery::new(model, "task", &names)?.run(&rows);
+    Ok(answers.into_iter().collect::<Result<_, _>>()?)
+}
+
+/// log p(task, what was seen); `None` where the task's probability is too small for a number.
+fn joint(answer: &RowPosterior, state: usize) -> Option<f64> {
+    let log_task = answer.posterior[state].ln();
+    log_task.is_finite().then_some(answer.log_evidence + log_task)
 }
 
 /// log p(seen | task, given): `seen` must contain `given`.

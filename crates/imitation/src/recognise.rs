@@ -41,22 +41,26 @@ impl TaskPosterior {
 ///
 /// [`ModelError`] where a node has another dimension than its feature.
 pub fn evidence(model: &Model, features: &Features, nodes: &[&str]) -> Result<Evidence, ModelError> {
-    let values: [(&str, &[f64]); 7] = [
-        ("size", &features.size),
-        ("cvex", &[features.cvex]),
-        ("egpc", &features.egpc),
-        ("upos", &features.upos),
-        ("dir", &features.dir),
-        ("fvol", &[features.fvol]),
-        ("qeps", &[features.qeps]),
-    ];
     let mut evidence = Evidence::new();
-    for (node, value) in values {
+    for (node, value) in values(features) {
         if nodes.contains(&node) && model.index(node).is_ok() {
-            evidence = evidence.with_value(model, node, value)?;
+            evidence = evidence.with_value(model, node, &value)?;
         }
     }
     Ok(evidence)
+}
+
+/// Every node with its value.
+pub(crate) fn values(features: &Features) -> [(&'static str, Vec<f64>); 7] {
+    [
+        ("size", features.size.to_vec()),
+        ("cvex", vec![features.cvex]),
+        ("egpc", features.egpc.to_vec()),
+        ("upos", features.upos.to_vec()),
+        ("dir", features.dir.to_vec()),
+        ("fvol", vec![features.fvol]),
+        ("qeps", vec![features.qeps]),
+    ]
 }
 
 /// The demonstrator's posterior over tasks given everything that was shown: P(T | o, a, c).
