@@ -10,7 +10,24 @@ pub struct Icosphere {
     directions: Vec<UnitVector3<f64>>,
     weights: Vec<f64>,
     /// Faces of every level, the children of face `f` being `4 f … 4 f + 3` of the next.
-    levels: Vec<Vec<[u32; 3]>>,
+    levels: Vec<Vec<Face>>,
+}
+
+/// A face's directions a, b, c, and b × c, c × a, a × b.
+#[derive(Debug, Clone, PartialEq)]
+struct Face {
+    corners: [u32; 3],
+    sides: [Vector3<f64>; 3],
+}
+
+impl Face {
+    fn new(corners: [u32; 3], directions: &[UnitVector3<f64>]) -> Self {
+        let [a, b, c] = corners.map(|v| directions[v as usize].as_ref());
+        Self {
+            corners,
+            sides: [b.cross(c), c.cross(a), a.cross(b)],
+        }
+    }
 }
 
 impl Icosphere {
@@ -40,10 +57,12 @@ impl Icosphere {
                 weights[*v as usize] += third;
             }
         }
+        let directions: Vec<_> = points.into_iter().map(UnitVector3::new_unchecked).collect();
+        let faces = |level: Vec<[u32; 3]>| level.into_iter().map(|f| Face::new(f, &directions)).collect();
         Self {
-            directions: points.into_iter().map(UnitVector3::new_unchecked).collect(),
+            levels: levels.into_iter().map(faces).collect(),
+            directions,
             weights,
-            levels,
         }
     }
 
@@ -77,15 +96,9 @@ impl Icosphere {
 
     /// The face that a direction passes through: its three directions and their weights, which add up to 1.
     pub fn locate(&self, direction: &Vector3<f64>) -> [(usize, f64); 3] {
-        let corner = |v: u32| self.directions[v as usize].as_ref();
         // Coordinates of the direction in the cone of a face; the least is ≥ 0 inside.
-        let coordinates = |face: &[u32; 3]| {
-            let [a, b, c] = face.map(corner);
-            let w = [
-                direction.dot(&b.cross(c)),
-                direction.dot(&c.cross(a)),
-                direction.dot(&a.cross(b)),
-            ];
+        let coordinates = |face: &Face| {
+            let w = face.sides.map(|side| direction.dot(&side));
             (w, w[0].min(w[1]).min(w[2]))
         };
         let mut candidates = 0..20;
@@ -96,7 +109,7 @@ impl Icosphere {
                 let (w, least) = coordinates(&faces[f]);
                 if least > best.0 {
                     best = (least, f);
-                    inside = (w, faces[f]);
+                    inside = (w, faces[f].corners);
                 }
             }
             candidates = 4 * best.1..4 * best.1 + 4;

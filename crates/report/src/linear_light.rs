@@ -1,5 +1,7 @@
 //! Colours in linear light, multiplied by their alpha, and their way to sRGB bytes.
 
+use std::sync::LazyLock;
+
 /// Red, green, blue in linear light multiplied by alpha, and alpha.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Rgba(pub [f32; 4]);
@@ -43,12 +45,17 @@ pub(crate) fn to_srgb(sum: Rgba, n: f32) -> [u8; 4] {
 
 /// sRGB byte to linear light (IEC 61966-2-1).
 fn decode(byte: u8) -> f32 {
-    let c = f32::from(byte) / 255.0;
-    if c <= 0.04045 {
-        c / 12.92
-    } else {
-        ((c + 0.055) / 1.055).powf(2.4)
-    }
+    static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|byte| {
+            let c = byte as f32 / 255.0;
+            if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            }
+        })
+    });
+    LINEAR[usize::from(byte)]
 }
 
 /// Linear light to an sRGB byte.

@@ -153,7 +153,8 @@ impl<'a> Canvas<'a> {
         let (x0, y0) = (first(a.x.min(b.x).min(c.x)), first(a.y.min(b.y).min(c.y)));
         let x1 = last(a.x.max(b.x).max(c.x), self.width);
         let y1 = last(a.y.max(b.y).max(c.y), self.height);
-        if x1 < 0.0 || y1 < 0.0 {
+        // Most triangles of a fine mesh lie between samples.
+        if x1 < x0 as f64 || y1 < y0 as f64 {
             return;
         }
         // Barycentric coordinates are linear in x and y.
@@ -168,7 +169,19 @@ impl<'a> Canvas<'a> {
         for y in y0..=y1 as usize {
             let py = y as f64 + 0.5;
             let at_row = edges.map(|[_, ey, e]| ey * py + e);
-            for x in x0..=x1 as usize {
+            // Where each coordinate turns negative, and a sample more.
+            let (mut from, mut to) = (x0 as f64, x1);
+            for ([ex, _, _], at_row) in edges.iter().zip(at_row) {
+                if *ex > 0.0 {
+                    from = from.max(-at_row / ex - 1.5);
+                } else if *ex < 0.0 {
+                    to = to.min(-at_row / ex + 0.5);
+                }
+            }
+            if to < from {
+                continue;
+            }
+            for x in from as usize..=to as usize {
                 let px = x as f64 + 0.5;
                 let w: [f64; 3] = std::array::from_fn(|k| edges[k][0] * px + at_row[k]);
                 if w[0] >= 0.0 && w[1] >= 0.0 && w[2] >= 0.0 {
@@ -192,9 +205,10 @@ impl<'a> Canvas<'a> {
             std::mem::take(&mut self.normal),
         );
         for (triangle, normals) in body.mesh.triangles.iter().zip(&body.mesh.normals) {
-            let normals = normals.map(|n| camera_from_body * n);
+            let mut turned = None;
             self.cover(triangle.map(|v| corners[v as usize]), |i, z, w| {
                 if z as f32 > depth[i] {
+                    let normals = turned.get_or_insert_with(|| normals.map(|n| camera_from_body * n));
                     let n = normals[0] * w[0] + normals[1] * w[1] + normals[2] * w[2];
                     depth[i] = z as f32;
                     owner[i] = id;
