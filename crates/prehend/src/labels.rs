@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use rusqlite::{Connection, OptionalExtension, params};
+use rusqlite::{Connection, OptionalExtension, Transaction, params};
 
 use crate::Error;
 
@@ -143,43 +143,18 @@ impl LabelStore {
     ///
     /// [`Error::Input`] where the store refuses, for example because the disk is full.
     pub fn append(&mut self, session: &Session, labelled: &[Labelled], at: &str) -> Result<(), Error> {
+        self.append_all(&[(session.clone(), labelled.to_vec())], at)
+    }
+
+    /// [`LabelStore::append`] for several sessions, all or none: the disk is waited for once.
+    ///
+    /// # Errors
+    ///
+    /// As [`LabelStore::append`].
+    pub fn append_all(&mut self, sessions: &[(Session, Vec<Labelled>)], at: &str) -> Result<(), Error> {
         let transaction = self.connection.transaction().map_err(store_error)?;
-        transaction
-            .execute(
-                "INSERT INTO session (tutor, persona, seed, dataset, hand, object, object_type, at) VALUES (?1,?2,?3,?4,?5,?6,?7,?8)",
-                params![
-                    session.tutor,
-                    session.persona,
-                    session.seed.cast_signed(),
-                    session.dataset,
-                    session.hand,
-                    session.object,
-                    session.object_type,
-                    at
-                ],
-            )
-            .map_err(store_error)?;
-        let id = transaction.last_insert_rowid();
-        {
-            let mut event = transaction
-                .prepare_cached("INSERT INTO event (session, grasp, at) VALUES (?1,?2,?3)")
-                .map_err(store_error)?;
-            let mut task = transaction
-                .prepare_cached(
-                    "INSERT INTO event_task (event, task, answer, probability, rule) VALUES (?1,?2,?3,?4,?5)",
-                )
-                .map_err(store_error)?;
-            for grasp in labelled {
-                event
-                    .execute(params![id, grasp.grasp_id, at])
-                    .map_err(store_error)?;
-                let seq = transaction.last_insert_rowid();
-                for answer in &grasp.answers {
-                    let word = if answer.yes { "yes" } else { "no" };
-                    task.execute(params![seq, answer.task, word, answer.probability, answer.rule])
-                        .map_err(store_error)?;
-                }
-            }
+        for (session, labelled) in sessions {
+            insert(&transaction, session, labelled, at).map_err(store_error)?;
         }
         transaction.commit().map_err(store_error)
     }
@@ -196,40 +171,71 @@ impl LabelStore {
     ) -> Result<BTreeMap<String, Vec<Answer>>, Error> {
         let mut statement = self
             .connection
-            .prepare("SELECT grasp, task, answer, probability, rule, dataset, seq FROM label WHERE persona = ?1 ORDER BY seq, task")
+            .prepare("SELECT grasp, task, answer, probability, rule, seq FROM label WHERE persona = ?1 AND dataset = coalesce(?2, dataset) ORDER BY seq, task")
             .map_err(store_error)?;
-        let mut rows = statement.query(params![persona]).map_err(store_error)?;
         let mut found: BTreeMap<String, (i64, Vec<Answer>)> = BTreeMap::new();
-        while let Some(row) = rows.next().map_err(store_error)? {
-            let read = || -> rusqlite::Result<_> {
-                let answer = Answer {
-                    task: row.get(1)?,
-                    yes: row.get::<_, String>(2)? == "yes",
-                    probability: row.get(3)?,
-                    rule: row.get(4)?,
+        let all = [None];
+        let some: Vec<Option<&String>> = datasets.iter().map(Some).collect();
+        for dataset in if datasets.is_empty() { &all[..] } else { &some } {
+            let mut rows = statement.query(params![persona, dataset]).map_err(store_error)?;
+            while let Some(row) = rows.next().map_err(store_error)? {
+                let read = || -> rusqlite::Result<_> {
+                    let answer = Answer {
+                        task: row.get(1)?,
+                        yes: row.get_ref(2)?.as_str()? == "yes",
+                        probability: row.get(3)?,
+                        rule: row.get(4)?,
+                    };
+                    Ok((row.get::<_, String>(0)?, answer, row.get::<_, i64>(5)?))
                 };
-                Ok((
-                    row.get::<_, String>(0)?,
-                    answer,
-                    row.get::<_, String>(5)?,
-                    row.get::<_, i64>(6)?,
-                ))
-            };
-            let (grasp, answer, dataset, seq) = read().map_err(store_error)?;
-            if !datasets.is_empty() && !datasets.contains(&dataset) {
-                continue;
+                let (grasp, answer, seq) = read().map_err(store_error)?;
+                let entry = found.entry(grasp).or_insert_with(|| (seq, Vec::new()));
+                if entry.0 < seq {
+                    *entry = (seq, Vec::new());
+                }
+                if entry.0 == seq {
+                    entry.1.push(answer);
+                }
             }
-            let entry = found.entry(grasp).or_insert_with(|| (seq, Vec::new()));
-            if entry.0 != seq {
-                *entry = (seq, Vec::new());
-            }
-            entry.1.push(answer);
         }
         Ok(found
             .into_iter()
             .map(|(grasp, (_, answers))| (grasp, answers))
             .collect())
     }
+}
+
+fn insert(
+    transaction: &Transaction,
+    session: &Session,
+    labelled: &[Labelled],
+    at: &str,
+) -> rusqlite::Result<()> {
+    transaction.prepare_cached("INSERT INTO session (tutor, persona, seed, dataset, hand, object, object_type, at) VALUES (?1,?2,?3,?4,?5,?6,?7,?8)")?
+        .execute(params![
+            session.tutor,
+            session.persona,
+            session.seed.cast_signed(),
+            session.dataset,
+            session.hand,
+            session.object,
+            session.object_type,
+            at
+        ])?;
+    let id = transaction.last_insert_rowid();
+    let mut event = transaction.prepare_cached("INSERT INTO event (session, grasp, at) VALUES (?1,?2,?3)")?;
+    let mut task = transaction.prepare_cached(
+        "INSERT INTO event_task (event, task, answer, probability, rule) VALUES (?1,?2,?3,?4,?5)",
+    )?;
+    for grasp in labelled {
+        event.execute(params![id, grasp.grasp_id, at])?;
+        let seq = transaction.last_insert_rowid();
+        for answer in &grasp.answers {
+            let word = if answer.yes { "yes" } else { "no" };
+            task.execute(params![seq, answer.task, word, answer.probability, answer.rule])?;
+        }
+    }
+    Ok(())
 }
 
 fn store_error(e: rusqlite::Error) -> Error {

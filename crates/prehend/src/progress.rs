@@ -4,6 +4,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use rayon::prelude::*;
+
 use crate::Error;
 
 /// Receives what a stage does; the binary draws bars with it.
@@ -76,6 +78,58 @@ impl Watch<'_> {
     }
 }
 
+/// Runs jobs side by side and returns what they make, in their order. What they warn of is passed on in their order too,
+/// whichever ends first.
+///
+/// # Errors
+///
+/// The first job's that fails, once all are done.
+pub fn side_by_side<J: Sync, T: Send>(
+    watch: Watch,
+    jobs: &[J],
+    work: impl Fn(&J, Watch) -> Result<T, Error> + Sync,
+) -> Result<Vec<T>, Error> {
+    let one = |job: &J| {
+        let held = Held {
+            inner: watch.progress,
+            warnings: Mutex::default(),
+        };
+        let watch = Watch {
+            progress: &held,
+            ..watch
+        };
+        let result = watch.check().and_then(|()| work(job, watch));
+        (held.warnings.into_inner().unwrap_or_default(), result)
+    };
+    let done: Vec<_> = jobs.par_iter().with_max_len(1).map(one).collect();
+    done.into_iter()
+        .map(|(warnings, result)| {
+            for warning in warnings {
+                watch.progress.warn(&warning);
+            }
+            result
+        })
+        .collect()
+}
+
+/// Passes steps on at once, and holds warnings back.
+struct Held<'a> {
+    inner: &'a dyn Progress,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Progress for Held<'_> {
+    fn advance(&self, steps: u64) {
+        self.inner.advance(steps);
+    }
+
+    fn warn(&self, message: &str) {
+        if let Ok(mut warnings) = self.warnings.lock() {
+            warnings.push(message.to_owned());
+        }
+    }
+}
+
 /// Passes everything on, and keeps the warnings for the report.
 pub struct Noted<'a> {
     inner: &'a dyn Progress,
@@ -131,6 +185,30 @@ pub fn unwatched() -> Watch<'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn warnings_of_jobs_side_by_side_come_in_the_order_of_the_jobs() {
+        let noted = Noted::new(&Silent);
+        let watch = Watch {
+            progress: &noted,
+            stop: &NEVER,
+        };
+        let jobs: Vec<u32> = (0..50).collect();
+        let work = |job: &u32, watch: Watch| {
+            let steps: u32 = (0..(50 - job) * 1000).map(|i| i % 3).sum();
+            watch.progress.warn(&format!("{job} is slow"));
+            Ok((*job, steps))
+        };
+        let done = side_by_side(watch, &jobs, work).unwrap();
+        assert!(done.iter().map(|(job, _)| job).eq(&jobs));
+        let expected: Vec<String> = jobs.iter().map(|job| format!("{job} is slow")).collect();
+        assert_eq!(noted.warnings(), expected);
+        let failed = side_by_side(watch, &jobs, |job, _| match job {
+            3.. => Err::<(), _>(Error::input(job.to_string())),
+            _ => Ok(()),
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "3");
+    }
 
     #[test]
     fn only_a_fault_of_the_input_is_left_out() {

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::UnitVector3;
 use prehend_model::{BatchQuery, Evidence, Model, Table};
 use prehend_report::Icosphere;
 use rayon::prelude::*;
@@ -11,7 +10,7 @@ use rayon::prelude::*;
 use super::learn::{Dataset, NamedNetwork, Trainer};
 use crate::experiments::Experiments;
 use crate::frame::{Column, Frame};
-use crate::progress::Watch;
+use crate::progress::{Watch, side_by_side};
 use crate::training::{TASKS, to_table};
 use crate::{Error, Object};
 
@@ -27,6 +26,9 @@ pub const EVIDENCE: [(&str, &[&str]); 3] = [
 
 /// Level of the icosphere on which maps are computed: 2,562 directions.
 pub const MAP_LEVEL: usize = 4;
+
+/// Directions whose densities are one piece of parallel work.
+const DIRECTIONS_TOGETHER: usize = 64;
 
 /// Experiment A for one network and one object.
 #[derive(Debug, Clone)]
@@ -118,21 +120,20 @@ impl Run<'_> {
     fn maps(&self, datasets: &[Dataset]) -> Result<Vec<TaskMaps>, Error> {
         let (held_out, watch) = (&self.experiments.a.held_out, self.watch);
         let imitator = datasets.iter().find(|d| d.hand == self.experiments.imitator);
-        let mut maps = Vec::new();
         let Some(imitator) = imitator.filter(|_| !held_out.is_empty()) else {
             watch.progress.warn(&if held_out.is_empty() {
                 "experiment A is left out: of none of hammer, bottle and mug are there two objects, one to hold out and one to learn from".to_owned()
             } else {
                 format!("experiment A is left out: {} has no grasps", self.experiments.imitator)
             });
-            return Ok(maps);
+            return Ok(Vec::new());
         };
-        for network in self.networks {
-            watch.check()?;
+        let maps = side_by_side(watch, self.networks, |network, watch| {
             let (what, purpose) = ("experiment A", "experiment-a");
             let trained = self
                 .trainer
                 .train_or_warn(what, imitator, network, held_out, purpose, watch)?;
+            let mut maps = Vec::new();
             for (trained, name) in trained
                 .iter()
                 .flat_map(|t| held_out.iter().map(move |name| (t, name)))
@@ -142,8 +143,9 @@ impl Run<'_> {
                 maps.extend(watch.or_left_out(&what, None, map)?);
             }
             watch.progress.advance(1);
-        }
-        Ok(maps)
+            Ok(maps)
+        })?;
+        Ok(maps.concat())
     }
 
     fn classifications(&self, datasets: &[Dataset]) -> Result<Vec<Classification>, Error> {
@@ -153,38 +155,56 @@ impl Run<'_> {
                 "experiment B is left out: no type has two objects, one to hold out and one to learn from",
             );
         }
-        let mut classifications = Vec::new();
-        for dataset in datasets {
-            for network in self.networks {
-                let mut answers = Vec::new();
-                for (fold, held_out) in folds.iter().enumerate() {
-                    watch.check()?;
-                    let (what, purpose) = (
-                        format!("experiment B, fold {}", fold + 1),
-                        format!("experiment-b-{fold}"),
-                    );
-                    let trained = self
-                        .trainer
-                        .train_or_warn(&what, dataset, network, held_out, &purpose, watch)?;
-                    let test = dataset.copies_on(held_out)?;
-                    if let (Some(trained), true) = (&trained, test.n_rows() > 0) {
-                        let answer = classify(&trained.model, &test);
-                        answers.extend(watch.or_left_out(&what, None, answer)?);
-                    } else if trained.is_some() {
-                        watch.progress.warn(&format!(
-                            "{what} with {} is left out: no grasp on {} has a label",
-                            dataset.hand,
-                            held_out.join(", ")
-                        ));
-                    }
-                    watch.progress.advance(1);
-                }
-                if !answers.is_empty() {
-                    classifications.extend(merge(&dataset.hand, &network.name, &answers));
-                }
-            }
+        let tables: Vec<(&Dataset, &NamedNetwork)> = datasets
+            .iter()
+            .flat_map(|dataset| self.networks.iter().map(move |network| (dataset, network)))
+            .collect();
+        let jobs: Vec<_> = tables
+            .iter()
+            .flat_map(|table| (0..folds.len()).map(move |fold| (*table, fold)))
+            .collect();
+        let answers = side_by_side(watch, &jobs, |((dataset, network), fold), watch| {
+            let answer = self.fold(dataset, network, *fold, watch)?;
+            watch.progress.advance(1);
+            Ok(answer)
+        })?;
+        let merged = tables
+            .iter()
+            .zip(answers.chunks(folds.len().max(1)))
+            .filter(|(_, answers)| answers.iter().any(Option::is_some))
+            .flat_map(|((dataset, network), answers)| merge(&dataset.hand, &network.name, answers));
+        Ok(merged.collect())
+    }
+
+    /// One fold's answers of one hand and network; `None` where it is left out.
+    fn fold(
+        &self,
+        dataset: &Dataset,
+        network: &NamedNetwork,
+        fold: usize,
+        watch: Watch,
+    ) -> Result<Option<Vec<Fold>>, Error> {
+        let held_out = &self.experiments.b.folds[fold];
+        let (what, purpose) = (
+            format!("experiment B, fold {}", fold + 1),
+            format!("experiment-b-{fold}"),
+        );
+        let trained = self
+            .trainer
+            .train_or_warn(&what, dataset, network, held_out, &purpose, watch)?;
+        let Some(trained) = trained else {
+            return Ok(None);
+        };
+        let test = dataset.copies_on(held_out)?;
+        if test.n_rows() == 0 {
+            watch.progress.warn(&format!(
+                "{what} with {} is left out: no grasp on {} has a label",
+                dataset.hand,
+                held_out.join(", ")
+            ));
+            return Ok(None);
         }
-        Ok(classifications)
+        watch.or_left_out(&what, None, classify(&trained.model, &test))
     }
 }
 
@@ -197,6 +217,7 @@ fn task_maps(
 ) -> Result<TaskMaps, Error> {
     let features = dataset.object_features(object)?;
     let grid = Icosphere::new(MAP_LEVEL);
+    let directions: Vec<&[f64]> = grid.directions().iter().map(|d| d.as_slice()).collect();
     let densities = TASKS
         .iter()
         .map(|task| {
@@ -208,9 +229,13 @@ fn task_maps(
                 .query(&["upos"], &evidence)?
                 .mixture("upos")
                 .ok_or_else(|| Error::input("the network has no continuous node `upos`"))?;
-            let log_density =
-                |d: &UnitVector3<f64>| mixture.log_density(d.as_slice()).unwrap_or(f64::NEG_INFINITY);
-            let log_densities: Vec<f64> = grid.directions().par_iter().map(log_density).collect();
+            let log_densities: Vec<f64> = directions
+                .par_chunks(DIRECTIONS_TOGETHER)
+                .flat_map_iter(|some| {
+                    let flat = || vec![f64::NEG_INFINITY; some.len()];
+                    mixture.log_densities(some).unwrap_or_else(flat)
+                })
+                .collect();
             Ok(grid.normalized(&log_densities))
         })
         .collect::<Result<Vec<Vec<f64>>, Error>>()?;
@@ -281,13 +306,13 @@ pub(super) fn task_posteriors(model: &Model, table: &Table, nodes: &[&str]) -> R
         .collect()
 }
 
-fn merge(hand: &str, network: &str, folds: &[Vec<Fold>]) -> Vec<Classification> {
+fn merge(hand: &str, network: &str, folds: &[Option<Vec<Fold>>]) -> Vec<Classification> {
     EVIDENCE
         .iter()
         .map(|(name, _)| {
             let mut counts = vec![vec![0; 3]; 3];
             let (mut loss, mut copies, mut hit, mut grasps) = (0.0, 0, 0, 0);
-            for fold in folds.iter().flatten().filter(|f| f.evidence == *name) {
+            for fold in folds.iter().flatten().flatten().filter(|f| f.evidence == *name) {
                 for (sum, row) in counts.iter_mut().zip(&fold.counts) {
                     sum.iter_mut().zip(row).for_each(|(a, b)| *a += b);
                 }

@@ -12,7 +12,7 @@ use super::learn::{Dataset, NamedNetwork, Trainer};
 use crate::Error;
 use crate::experiments::Experiments;
 use crate::frame::Frame;
-use crate::progress::Watch;
+use crate::progress::{Watch, side_by_side};
 use crate::training::TASKS;
 
 /// One network's answer to the demonstration.
@@ -92,19 +92,16 @@ pub fn run(
     watch: Watch,
 ) -> Result<Vec<Imitation>, Error> {
     watch.progress.begin("imitate", networks.len() as u64);
-    let mut runs = Vec::new();
-    match Shown::new(datasets, experiments) {
-        Ok(shown) => {
-            for network in networks {
-                watch.check()?;
-                runs.extend(shown.imitate(experiments, network, trainer, watch)?);
-                watch.progress.advance(1);
-            }
-        }
-        Err(e) => {
-            watch.or_left_out("experiment C", None, Err::<(), _>(e))?;
-        }
-    }
+    let shown = watch.or_left_out("experiment C", None, Shown::new(datasets, experiments))?;
+    let runs = match shown {
+        Some(shown) => side_by_side(watch, networks, |network, watch| {
+            let run = shown.imitate(experiments, network, trainer, watch)?;
+            watch.progress.advance(1);
+            Ok(run)
+        })?,
+        None => Vec::new(),
+    };
+    let runs: Vec<Imitation> = runs.into_iter().flatten().collect();
     watch.progress.end();
     write_tables(&runs, out)?;
     Ok(runs)
@@ -150,10 +147,11 @@ impl<'a> Shown<'a> {
     ) -> Result<Option<Imitation>, Error> {
         let mut held_out = experiments.c.candidates.clone();
         held_out.push(experiments.c.demonstration.clone());
-        let train = |dataset: &Dataset| {
+        let train = |dataset: &&Dataset, watch: Watch| {
             trainer.train_or_warn("experiment C", dataset, network, &held_out, "experiment-c", watch)
         };
-        let (Some(teacher), Some(pupil)) = (train(self.demonstrator)?, train(self.imitator)?) else {
+        let pair = side_by_side(watch, &[self.demonstrator, self.imitator], train)?;
+        let [Some(teacher), Some(pupil)] = pair.as_slice() else {
             return Ok(None);
         };
         let answer = || {

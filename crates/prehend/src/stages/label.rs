@@ -18,11 +18,14 @@ use super::synthesize::{GraspFile, HandData};
 use crate::frame::{Column, Frame};
 use crate::grasp_table::{GraspRecord, records};
 use crate::labels::{Answer, LabelStore, Labelled, Session};
-use crate::progress::Watch;
+use crate::progress::{Watch, side_by_side};
 use crate::{Error, run_record};
 
 /// Points on the surface are drawn with this seed, whatever the run's: they are the tutor's eye, not its mood.
 const SAMPLE_SEED: u64 = 0;
+
+/// Tables whose labels are in memory together.
+const TABLES_TOGETHER: usize = 8;
 
 /// Where the labels of a run stand.
 #[derive(Debug, Clone)]
@@ -88,77 +91,127 @@ pub fn run(
         n_personas: Persona::ALL.len(),
     };
     let mut store = LabelStore::open(&labels.store)?;
-    for hand in hands {
-        let tutor_hand = TutorHand::new(&hand.hand).map_err(Error::input)?;
+    let mut jobs = Vec::new();
+    let tutor_hands = hands
+        .iter()
+        .map(|hand| TutorHand::new(&hand.hand).map_err(Error::input))
+        .collect::<Result<Vec<_>, _>>()?;
+    for (hand, tutor_hand) in hands.iter().zip(&tutor_hands) {
         for file in grasp_files.iter().filter(|f| f.hand == hand.hand.name()) {
-            watch.check()?;
             let Some(shape) = shapes.iter().find(|s| s.object.name == file.object) else {
                 continue;
             };
-            let margins = labels
-                .margins
-                .join(&file.hand)
-                .join(format!("{}.parquet", file.object));
-            let result = label_file(&tutor_hand, shape, file, seed, &mut store, &margins);
-            let what = format!("labelling {} with {}", file.object, file.hand);
-            watch.or_left_out(&what, Some(&shape.object.path), result)?;
+            let mut job = Job {
+                hand: tutor_hand,
+                shape,
+                file,
+                seed,
+                margins: labels
+                    .margins
+                    .join(&file.hand)
+                    .join(format!("{}.parquet", file.object)),
+                missing: Vec::new(),
+            };
+            for persona in Persona::ALL {
+                if !store.has(&job.session(persona))? {
+                    job.missing.push(persona);
+                }
+            }
+            if job.missing.is_empty() && job.margins_are_known() {
+                watch.progress.advance(1);
+            } else {
+                jobs.push(job);
+            }
             labels
                 .datasets
                 .entry(file.hand.clone())
                 .or_default()
                 .push(file.fingerprint.clone());
             labels.n_grasps += file.tries.kept;
-            watch.progress.advance(1);
         }
     }
+    // Both hands grasp the same objects.
+    let wanted: BTreeMap<&str, &Shape> = jobs
+        .iter()
+        .map(|job| (job.file.object.as_str(), job.shape))
+        .collect();
+    let wanted: Vec<(&str, &Shape)> = wanted.into_iter().collect();
+    let objects: BTreeMap<&str, Result<TutorObject, String>> =
+        side_by_side(watch, &wanted, |(name, shape), _| Ok((*name, seen(shape))))?
+            .into_iter()
+            .collect();
+    // While some tables are looked at, the labels of those before go into the store.
+    let mut waiting: Vec<(Session, Vec<Labelled>)> = Vec::new();
+    for some in jobs.chunks(TABLES_TOGETHER) {
+        let (stored, seen) = rayon::join(
+            || store.append_all(&waiting, &run_record::now()),
+            || {
+                side_by_side(watch, some, |job, watch| {
+                    let what = format!("labelling {} with {}", job.file.object, job.file.hand);
+                    let said = match &objects[job.file.object.as_str()] {
+                        Ok(object) => job.run(object),
+                        Err(reason) => Err(Error::file(&job.shape.object.path, reason)),
+                    };
+                    let said = watch.or_left_out(&what, Some(&job.shape.object.path), said)?;
+                    watch.progress.advance(1);
+                    Ok(said.unwrap_or_default())
+                })
+            },
+        );
+        stored?;
+        waiting = seen?.concat();
+    }
+    store.append_all(&waiting, &run_record::now())?;
     watch.progress.end();
     Ok(labels)
 }
 
-fn label_file(
-    hand: &TutorHand,
-    shape: &Shape,
-    file: &GraspFile,
+/// One table to label.
+struct Job<'a> {
+    hand: &'a TutorHand,
+    shape: &'a Shape,
+    file: &'a GraspFile,
     seed: u64,
-    store: &mut LabelStore,
-    margins: &Path,
-) -> Result<(), Error> {
-    let session = |persona: Persona| Session {
-        tutor: "scripted".into(),
-        persona: persona.name().into(),
-        seed,
-        dataset: file.fingerprint.clone(),
-        hand: file.hand.clone(),
-        object: file.object.clone(),
-        object_type: shape.object.kind.clone(),
-    };
-    let missing = Persona::ALL
-        .into_iter()
-        .map(|p| Ok((p, store.has(&session(p))?)))
-        .collect::<Result<Vec<_>, Error>>()?
-        .into_iter()
-        .filter_map(|(p, known)| (!known).then_some(p))
-        .collect::<Vec<_>>();
-    let known = Frame::read_metadata(margins)
-        .get("fingerprint")
-        .is_some_and(|f| *f == file.fingerprint);
-    if missing.is_empty() && known {
-        return Ok(());
+    /// Where the margins go.
+    margins: PathBuf,
+    /// Those whose labels the store does not have.
+    missing: Vec<Persona>,
+}
+
+impl Job<'_> {
+    fn session(&self, persona: Persona) -> Session {
+        Session {
+            tutor: "scripted".into(),
+            persona: persona.name().into(),
+            seed: self.seed,
+            dataset: self.file.fingerprint.clone(),
+            hand: self.file.hand.clone(),
+            object: self.file.object.clone(),
+            object_type: self.shape.object.kind.clone(),
+        }
     }
-    let frame = Frame::read(&file.path)?;
-    let grasps = records(&frame, hand.hand()).map_err(|e| Error::file(&file.path, e))?;
-    let object = tutor_object(shape)?;
-    let observations = observe_all(hand, &object, &grasps);
-    let mut table = margins_table(&grasps, &observations);
-    table
-        .metadata
-        .insert("fingerprint".into(), file.fingerprint.clone());
-    table.write(margins)?;
-    for persona in missing {
-        let labelled = label(&grasps, &observations, persona, seed, 0.0);
-        store.append(&session(persona), &labelled, &run_record::now())?;
+
+    fn margins_are_known(&self) -> bool {
+        Frame::read_metadata(&self.margins).get("fingerprint") == Some(&self.file.fingerprint)
     }
-    Ok(())
+
+    /// Writes the margins, and returns the labels that are missing.
+    fn run(&self, object: &TutorObject) -> Result<Vec<(Session, Vec<Labelled>)>, Error> {
+        let file = self.file;
+        let frame = Frame::read(&file.path)?;
+        let grasps = records(&frame, self.hand.hand()).map_err(|e| Error::file(&file.path, e))?;
+        let observations = observe_all(self.hand, object, &grasps);
+        let mut table = margins_table(&grasps, &observations);
+        table
+            .metadata
+            .insert("fingerprint".into(), file.fingerprint.clone());
+        table.write(&self.margins)?;
+        let said = |persona: &Persona| {
+            let labelled = label(&grasps, &observations, *persona, self.seed, 0.0);
+            (self.session(*persona), labelled)
+        };
+        Ok(self.missing.iter().map(said).collect())
+    }
 }
 
 /// The object as the tutor sees it.
@@ -167,6 +220,10 @@ fn label_file(
 ///
 /// What the tutor says of its surface or opening, with the object's file.
 pub fn tutor_object(shape: &Shape) -> Result<TutorObject, Error> {
+    seen(shape).map_err(|reason| Error::file(&shape.object.path, reason))
+}
+
+fn seen(shape: &Shape) -> Result<TutorObject, String> {
     let object = &shape.object;
     let surface = prehend_geometry::Surface::new(object.mesh.clone());
     let class = ObjectClass::of(&object.kind, &object.parts);
@@ -177,7 +234,7 @@ pub fn tutor_object(shape: &Shape) -> Result<TutorObject, Error> {
         &Thresholds::default(),
         SAMPLE_SEED,
     )
-    .map_err(|e| Error::file(&object.path, e))
+    .map_err(|e| e.to_string())
 }
 
 /// Looks at every grasp once.

@@ -15,7 +15,7 @@ use crate::experiments::Experiments;
 use crate::files::{self, Fingerprint};
 use crate::frame::Frame;
 use crate::labels::Answer;
-use crate::progress::Watch;
+use crate::progress::{Watch, side_by_side};
 use crate::training::{TASKS, balanced_rows, labelled_copies, to_table};
 
 /// A network and its name.
@@ -366,22 +366,23 @@ pub fn run(
     watch
         .progress
         .begin("learn", (hands.len() * networks.len()) as u64);
-    let (mut datasets, mut models) = (Vec::new(), Vec::new());
-    for hand in hands {
-        let answers = labels.answers(hand.hand.name(), &experiments.persona)?;
-        let what = format!("learning with {}", hand.hand.name());
-        let read = Dataset::read(hand.hand.name(), grasp_files, answers);
-        let Some(dataset) = watch.or_left_out(&what, None, read)? else {
-            continue;
-        };
-        for network in networks {
-            watch.check()?;
-            let trained = trainer.train_or_warn("learning", &dataset, network, &[], "", watch)?;
-            models.extend(trained.map(|t| (dataset.hand.clone(), network.name.clone(), t)));
-            watch.progress.advance(1);
-        }
-        datasets.push(dataset);
-    }
+    let read = side_by_side(watch, hands, |hand, watch| {
+        let name = hand.hand.name();
+        let answers = labels.answers(name, &experiments.persona)?;
+        let dataset = Dataset::read(name, grasp_files, answers);
+        watch.or_left_out(&format!("learning with {name}"), None, dataset)
+    })?;
+    let datasets: Vec<Dataset> = read.into_iter().flatten().collect();
+    let jobs: Vec<(&Dataset, &NamedNetwork)> = datasets
+        .iter()
+        .flat_map(|dataset| networks.iter().map(move |network| (dataset, network)))
+        .collect();
+    let trained = side_by_side(watch, &jobs, |(dataset, network), watch| {
+        let trained = trainer.train_or_warn("learning", dataset, network, &[], "", watch)?;
+        watch.progress.advance(1);
+        Ok(trained.map(|t| (dataset.hand.clone(), network.name.clone(), t)))
+    })?;
+    let models = trained.into_iter().flatten().collect();
     watch.progress.end();
     Ok(Learned { datasets, models })
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 use prehend_report::{DisplayMesh, HandShape, Picture, ReportData, Scene, render_page};
+use rayon::prelude::*;
 
 use super::ask::Answers;
 use super::decompose::Shape;
@@ -17,7 +18,7 @@ use crate::experiments::Experiments;
 use crate::frame::Frame;
 use crate::grasp_table::{GraspRecord, records};
 use crate::labels::Answer;
-use crate::progress::Watch;
+use crate::progress::{Watch, side_by_side};
 use crate::run_record::RunRecord;
 use crate::training::TASKS;
 use crate::{Error, files};
@@ -72,29 +73,34 @@ pub fn run(inputs: &Inputs, out: &Path, watch: Watch) -> Result<WrittenPage, Err
         tasks: TASKS.map(str::to_owned).to_vec(),
         ..ReportData::default()
     };
-    for shape in inputs.shapes {
-        watch.check()?;
-        data.objects.push(objects::section(inputs, &stand, shape)?);
+    data.objects = side_by_side(watch, inputs.shapes, |shape, watch| {
+        let section = objects::section(inputs, &stand, shape)?;
         watch.progress.advance(1);
-    }
+        Ok(section)
+    })?;
     data.run = overview::run_section(inputs);
     data.tries = overview::tries(inputs);
     data.training = overview::training(inputs);
-    data.labels = labels::section(inputs)?;
-    watch.progress.advance(1);
-    data.experiment_a = experiments::maps(inputs, &stand)?;
-    watch.check()?;
+    let (labels, (maps, imitation)) = rayon::join(
+        || labels::section(inputs),
+        || {
+            rayon::join(
+                || experiments::maps(inputs, &stand),
+                || experiments::imitation(inputs, &stand),
+            )
+        },
+    );
+    (data.labels, data.experiment_a, data.experiment_c) = (labels?, maps?, imitation?);
     data.experiment_b = experiments::classification(inputs);
-    data.experiment_c = experiments::imitation(inputs, &stand)?;
-    watch.progress.advance(1);
+    watch.check()?;
+    watch.progress.advance(2);
     data.summary = overview::summary(inputs, &stand)?;
     data.limits = overview::limits(inputs);
     data.files = overview::files();
     let page = render_page(&data);
     let folder = out.join("report");
-    for (name, bytes) in &page.figures {
-        files::write(&folder.join("figures").join(name), bytes)?;
-    }
+    let write = |(name, bytes): &(String, Vec<u8>)| files::write(&folder.join("figures").join(name), bytes);
+    page.figures.par_iter().try_for_each(write)?;
     let path = folder.join("index.html");
     files::write(&path, page.html.as_bytes())?;
     watch.progress.advance(1);
