@@ -93,24 +93,36 @@ fn merge_and_split(rows: &Rows, fit: Fit, options: FitOptions) -> Fit {
             .sum()
     };
     let volumes: Vec<f64> = (0..k).map(|c| log_volume(&fit.mixing, c)).collect();
-    let mut least = (f64::INFINITY, 0, 1, fit.mixing.clone());
+    // What a pair's components together would look like; with one covariance for all, all others are needed too.
+    let pair = |a: usize, b: usize| -> Vec<Vec<Moment>> {
+        let one = |cell: &Vec<Moment>| {
+            let mut sum = cell[a].clone();
+            sum.add(&cell[b]);
+            let others = (0..k).filter(|&c| settings.tied && c != a && c != b);
+            std::iter::once(sum)
+                .chain(others.map(|c| cell[c].clone()))
+                .collect()
+        };
+        moments.iter().map(one).collect()
+    };
+    let mut least = (f64::INFINITY, 0, 1);
     for a in 0..k {
         for b in a + 1..k {
-            let mut merged = moments.clone();
-            for cell in &mut merged {
-                let other = cell.remove(b);
-                cell[a].add(&other);
-            }
             let mass = fit.masses[a] + fit.masses[b];
-            let merged = maximize(settings, &merged);
-            let loss =
-                mass * log_volume(&merged, a) - fit.masses[a] * volumes[a] - fit.masses[b] * volumes[b];
+            let volume = log_volume(&maximize(settings, &pair(a, b)), 0);
+            let loss = mass * volume - fit.masses[a] * volumes[a] - fit.masses[b] * volumes[b];
             if loss < least.0 {
-                least = (loss, a, b, merged);
+                least = (loss, a, b);
             }
         }
     }
-    let (_, a, b, merged) = least;
+    let (_, a, b) = least;
+    let mut merged = moments;
+    for cell in &mut merged {
+        let other = cell.remove(b);
+        cell[a].add(&other);
+    }
+    let merged = maximize(settings, &merged);
     let widest = (0..k)
         .filter(|c| *c != a && *c != b)
         .fold(None, |best: Option<usize>, c| match best {
