@@ -1,14 +1,17 @@
 //! The labels: how often, how far personas agree, and which feature comes nearest to each rule.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use prehend_report::{Agreement, HandLabels, LabelSection, Prevalence, Rule as RuleRow};
 use prehend_tutor::{Persona, Rule};
+use rayon::prelude::*;
 
 use super::Inputs;
 use crate::Error;
 use crate::frame::Frame;
 use crate::labels::Answer;
+use crate::stages::learn::Dataset;
 use crate::training::TASKS;
 
 /// Features that a rule may be a likeness of.
@@ -72,7 +75,7 @@ pub(super) fn section(inputs: &Inputs) -> Result<LabelSection, Error> {
         }
         section.prevalence.extend(by_kind.into_values());
         section.hands.push(whole);
-        section.agreement.extend(agreement(inputs, &dataset.hand)?);
+        section.agreement.extend(agreement(inputs, dataset)?);
         for answer in dataset.answers.values().flatten() {
             *decided.entry(answer.rule.clone()).or_insert(0) += 1;
         }
@@ -103,17 +106,27 @@ fn yes(answers: &Answers, id: &str) -> [bool; 3] {
 }
 
 /// Agreement of every pair of personas; only on grasps of objects that afford the task, since all agree on the others.
-fn agreement(inputs: &Inputs, hand: &str) -> Result<Vec<Agreement>, Error> {
-    let all: Vec<(Persona, Answers)> = Persona::ALL
-        .into_iter()
-        .map(|p| Ok((p, inputs.labels.answers(hand, p.name())?)))
+fn agreement(inputs: &Inputs, dataset: &Dataset) -> Result<Vec<Agreement>, Error> {
+    let hand = &dataset.hand;
+    let answers = |persona: Persona| {
+        let known = persona.name() == inputs.experiments.persona;
+        let found = if known {
+            Cow::Borrowed(&dataset.answers)
+        } else {
+            Cow::Owned(inputs.labels.answers(hand, persona.name())?)
+        };
+        Ok((persona, found))
+    };
+    let all: Vec<(Persona, Cow<Answers>)> = Persona::ALL
+        .into_par_iter()
+        .map(answers)
         .collect::<Result<_, Error>>()?;
     let mut rows = Vec::new();
     for (i, (first, a)) in all.iter().enumerate() {
         for (second, b) in &all[i + 1..] {
             for (t, task) in TASKS.iter().enumerate() {
                 let mut counts = [0; 4];
-                for (id, answers) in a {
+                for (id, answers) in a.iter() {
                     if answers
                         .iter()
                         .any(|x| x.task == *task && x.rule != "not afforded")

@@ -1,6 +1,7 @@
 //! Per object: its boxes over the mesh, what was guessed, a sheet of grasps a hand.
 
 use nalgebra::Vector3;
+use prehend_grasp::object_size;
 use prehend_report::{
     GraspPicture, GraspSheet, ObjectSection, PARTS_LEGEND, PartMarks, Picture, Scene, View,
 };
@@ -44,10 +45,7 @@ pub(super) fn section(inputs: &Inputs, stand: &Stand, shape: &Shape) -> Result<O
         name: object.name.clone(),
         object_type: object.kind.clone(),
         n_triangles: object.mesh.n_triangles(),
-        size: shape
-            .grasp_object()
-            .map_err(|e| Error::file(&object.path, e))?
-            .size(),
+        size: object_size(&shape.decomposition.root),
         cvex: shape.decomposition.cvex,
         n_boxes,
         notes,
