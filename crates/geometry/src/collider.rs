@@ -13,6 +13,8 @@ use crate::{GeometryError, Solid};
 #[derive(Debug, Clone)]
 pub struct Collider {
     pub(crate) core: Core,
+    /// The core's hull, for what only needs its farthest points.
+    pub(crate) hull: ConvexBody,
     /// Distance from the core to the solid's surface.
     pub(crate) radius: f64,
     /// Corners, edges and faces of the core, for contact patches.
@@ -166,8 +168,17 @@ impl Collider {
             radius: farthest + radius,
         };
         let cover = cover(core_center, core_half, radius, &bounding);
+        let hull = match &core {
+            Core::Convex(body) => body.clone(),
+            Core::Mesh(_) => {
+                let outer = parry_bridge::hull(&corners).map(|(corners, _)| corners);
+                ConvexBody::points(outer.as_ref().unwrap_or(&corners))
+            }
+            Core::Point | Core::Segment(_) => ConvexBody::points(&corners),
+        };
         Ok(Self {
             core,
+            hull,
             radius,
             corners,
             edges,
@@ -200,10 +211,13 @@ impl Collider {
     }
 }
 
-/// Balls around cells of the core's bounds, about as large as the solid is thick.
+/// Balls around parts of the core's bounds: cells about as large as the solid is thick.
 fn cover(center: Vector3<f64>, half: Vector3<f64>, radius: f64, bounding: &Ball) -> Vec<Ball> {
-    let thickness = (half.min() + radius).max(half.max() / 6.0).max(1e-6);
-    let counts = half.map(|h| ((h / thickness).ceil().max(1.0) as usize).min(6));
+    if radius > 0.0 {
+        return capsule_cover(half.z, radius);
+    }
+    let thickness = half.min().max(half.max() / 6.0).max(1e-6);
+    let counts = half.map(|h| (h / thickness).ceil().clamp(1.0, 6.0) as usize);
     if counts.iter().product::<usize>() == 1 {
         return vec![*bounding];
     }
@@ -216,12 +230,31 @@ fn cover(center: Vector3<f64>, half: Vector3<f64>, radius: f64, bounding: &Ball)
                 let at = center - half + cell.component_mul(&step);
                 balls.push(Ball {
                     center: at.into(),
-                    radius: cell.norm() + radius,
+                    radius: cell.norm(),
                 });
             }
         }
     }
     balls
+}
+
+/// A ball around each end, and balls around slices in between that reach little beyond the capsule.
+fn capsule_cover(half_length: f64, radius: f64) -> Vec<Ball> {
+    let at = |z: f64, radius: f64| Ball {
+        center: Point3::new(0.0, 0.0, z),
+        radius,
+    };
+    if half_length == 0.0 {
+        return vec![at(0.0, radius)];
+    }
+    let n_slices = (half_length / (0.6 * radius)).ceil().clamp(1.0, 16.0);
+    let slice = half_length / n_slices;
+    let between = (0..n_slices as usize).map(|i| {
+        let z = slice * (2.0 * i as f64 + 1.0) - half_length;
+        at(z, slice.hypot(radius))
+    });
+    let ends = [-half_length, half_length].map(|z| at(z, radius));
+    between.chain(ends).collect()
 }
 
 fn cuboid_faces() -> Vec<[u32; 3]> {
@@ -307,8 +340,27 @@ mod tests {
             });
             for p in collider.corners.iter().copied().chain(middles) {
                 let held = |b: &Ball| (p - b.center).norm() + collider.radius <= b.radius + 1e-12;
+                if collider.radius > 0.0 {
+                    assert!(held(&collider.bounding_ball()), "{solid:?} {p}");
+                    continue;
+                }
                 assert!(collider.cover().iter().any(held), "{solid:?} {p}");
                 assert!(held(&collider.bounding_ball()), "{solid:?} {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_point_of_a_capsule_lies_in_a_covering_ball() {
+        for (half_length, radius) in [(1.0, 0.2), (0.01, 0.2), (5.0, 0.01), (0.0, 0.3)] {
+            let capsule = Collider::new(&Solid::Capsule { half_length, radius }).unwrap();
+            for i in 0..=400 {
+                // Along the outline, cap, side, cap.
+                let z = (f64::from(i) / 200.0 - 1.0) * (half_length + radius);
+                let beyond = (z.abs() - half_length).max(0.0);
+                let p = Point3::new((radius * radius - beyond * beyond).max(0.0).sqrt(), 0.0, z);
+                let held = |b: &Ball| (p - b.center).norm() <= b.radius + 1e-9;
+                assert!(capsule.cover().iter().any(held), "{half_length} {radius} {p}");
             }
         }
     }

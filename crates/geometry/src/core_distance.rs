@@ -22,11 +22,14 @@ pub(crate) struct Nearest {
 
 impl TriangleTree {
     /// The nearest triangle to a solid's core closer than `below`. Other triangles as near as it may be chosen.
+    ///
+    /// A triangle that may be the nearest, `hint`, is looked at first: the better it is the less is looked at.
     pub(crate) fn nearest_core(
         &self,
         collider: &Collider,
         tree_from_core: &Isometry3<f64>,
         below: f64,
+        hint: Option<u32>,
     ) -> Option<Nearest> {
         let placed = PlacedBounds::new(collider, tree_from_core);
         // A triangle beyond a plane that stands `best` off the core need not be looked at.
@@ -42,7 +45,7 @@ impl TriangleTree {
                 return Some(((pair.0 - pair.1).norm(), pair));
             };
             let mut planes = planes.borrow_mut();
-            if planes.distance_of(triangle) >= best {
+            if planes.are_before(triangle, best) {
                 return None;
             }
             let pair = planes.convex_to_triangle(collider, body, tree_from_core, triangle, best)?;
@@ -54,14 +57,17 @@ impl TriangleTree {
             Some((distance, pair))
         };
         // Where the search begins well, planes leave little to look at.
-        let mut seed = None;
         let is_convex = matches!(collider.core, Core::Convex(_));
-        if is_convex {
+        let look = |i: u32| {
+            leaf(i, below)
+                .filter(|(distance, _)| *distance < below)
+                .map(|s| (i, s))
+        };
+        let mut seed = hint.and_then(look);
+        if is_convex && seed.is_none() {
             let reach = below + collider.core_half.norm();
             let first = self.near_triangle(&placed.center.into(), reach * (1.0 + 1e-9))?;
-            seed = leaf(first, below)
-                .filter(|(distance, _)| *distance < below)
-                .map(|s| (first, s));
+            seed = look(first);
             let again = seed.as_ref().and_then(|(_, (distance, (on_core, _)))| {
                 let (_, _, second) = self.nearest_point(on_core, *distance)?;
                 let found = leaf(second, *distance)?;
@@ -73,11 +79,10 @@ impl TriangleTree {
         let found = self.bvh.find_best(
             best,
             |node, best| {
-                let apart = placed.distance(node, best);
-                if is_convex && apart < best {
-                    apart.max(planes.borrow().distance(node))
+                if is_convex && planes.borrow().are_before_node(node, best) {
+                    best
                 } else {
-                    apart
+                    placed.distance(node, best)
                 }
             },
             leaf,

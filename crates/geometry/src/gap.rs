@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::collider::{Collider, Core};
 use crate::core_distance::{self, core_to_triangle};
+use crate::separating_planes::Planes;
 use crate::{Surface, closest};
 
 /// The closest points of a surface and a solid, in the surface's frame.
@@ -26,9 +27,22 @@ impl Surface {
     /// Exact up to rounding. A small cutoff is cheap. The surface is a shell: a solid that lies wholly inside a
     /// closed mesh has a positive gap too; see [`Surface::is_inside`].
     pub fn gap(&self, solid: &Collider, surface_from_solid: &Isometry3<f64>, cutoff: f64) -> Option<Gap> {
+        self.gap_from(solid, surface_from_solid, cutoff, None)
+    }
+
+    /// [`gap`](Self::gap) for a solid that has moved a little: `hint` is the triangle that was nearest before, which is
+    /// looked at first.
+    pub fn gap_from(
+        &self,
+        solid: &Collider,
+        surface_from_solid: &Isometry3<f64>,
+        cutoff: f64,
+        hint: Option<usize>,
+    ) -> Option<Gap> {
+        let hint = hint.filter(|i| *i < self.mesh().n_triangles()).map(|i| i as u32);
         let near = self
             .tree()
-            .nearest_core(solid, surface_from_solid, cutoff + solid.radius)?;
+            .nearest_core(solid, surface_from_solid, cutoff + solid.radius, hint)?;
         let outward = near.on_tree - near.on_core;
         let on_solid = match outward.try_normalize(1e-12) {
             Some(unit) if solid.radius > 0.0 => near.on_core + unit * solid.radius,
@@ -45,7 +59,7 @@ impl Surface {
     /// Whether a placed solid and the surface share a point.
     pub fn intersects(&self, solid: &Collider, surface_from_solid: &Isometry3<f64>) -> bool {
         self.tree()
-            .nearest_core(solid, surface_from_solid, solid.radius + f64::MIN_POSITIVE)
+            .nearest_core(solid, surface_from_solid, solid.radius + f64::MIN_POSITIVE, None)
             .is_some()
     }
 
@@ -94,6 +108,7 @@ impl Surface {
             .map(|e| bounds(&e.map(|i| corners[i as usize])))
             .collect();
         let mut found = Vec::new();
+        let mut planes = Planes::default();
         for triangle_idx in triangles {
             let triangle = self.tree().triangle(triangle_idx);
             let mut keep = |on_core: Point3<f64>, on_surface: Point3<f64>| {
@@ -111,8 +126,14 @@ impl Surface {
                     });
                 }
             };
-            let Some((on_core, on_surface)) = core_to_triangle(solid, surface_from_solid, triangle, reach)
-            else {
+            let nearest = match &solid.core {
+                Core::Convex(_) if planes.are_before(triangle, reach) => None,
+                Core::Convex(body) => {
+                    planes.convex_to_triangle(solid, body, surface_from_solid, triangle, reach)
+                }
+                _ => core_to_triangle(solid, surface_from_solid, triangle, reach),
+            };
+            let Some((on_core, on_surface)) = nearest else {
                 continue;
             };
             if (on_core - on_surface).norm() >= reach {

@@ -54,22 +54,20 @@ impl Planes {
         self.all[..self.n_found.min(N_PLANES)].iter()
     }
 
-    /// A lower bound of a triangle's distance from the core; may be negative.
-    pub(crate) fn distance_of(&self, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-        let distance = |plane: &Plane| {
+    /// Whether some plane shows that a triangle's distance from the core is `best` or more.
+    pub(crate) fn are_before(&self, [a, b, c]: &[Point3<f64>; 3], best: f64) -> bool {
+        self.iter().any(|plane| {
             let height = |p: &Point3<f64>| plane.normal.dot(&p.coords);
-            height(a).min(height(b)).min(height(c)) - plane.height
-        };
-        self.iter().map(distance).fold(f64::NEG_INFINITY, f64::max)
+            height(a).min(height(b)).min(height(c)) - plane.height >= best
+        })
     }
 
-    /// A lower bound of the distance of everything in a node from the core; may be negative.
-    pub(crate) fn distance(&self, node: &BvhNode) -> f64 {
+    /// Whether some plane shows that everything in a node is `best` or more away from the core.
+    pub(crate) fn are_before_node(&self, node: &BvhNode, best: f64) -> bool {
         let (center, half) = parry_bridge::node_bounds(node);
         let (center, half) = (Vector3::from(center), Vector3::from(half));
-        let distance =
-            |plane: &Plane| plane.normal.dot(&center) - plane.normal.abs().dot(&half) - plane.height;
-        self.iter().map(distance).fold(f64::NEG_INFINITY, f64::max)
+        self.iter()
+            .any(|plane| plane.normal.dot(&center) - plane.normal.abs().dot(&half) - plane.height >= best)
     }
 
     /// Closest points (core, triangle); `None` where they are not closer than `below`, by a plane that is then kept.
