@@ -1,5 +1,7 @@
 //! The hand comes in along its palm's z axis until something touches.
 
+use std::cell::Cell;
+
 use nalgebra::{Isometry3, Translation3, Vector3};
 use prehend_geometry::{Collider, Surface};
 use prehend_hand::JointPositions;
@@ -13,14 +15,37 @@ pub(crate) const LEAST_STEP: f64 = 5e-4;
 /// An exact gap is looked for up to this distance, metres; beyond it, one step this long is as good.
 const REACH: f64 = 5e-3;
 
-/// The gap of a solid, or a lower bound of it above [`NEAR`].
-pub(crate) fn look(surface: &Surface, solid: &Collider, pose: &Isometry3<f64>) -> f64 {
-    let bound = surface.gap_lower_bound(solid, pose);
-    if bound > NEAR {
-        return bound;
+/// The triangle that was last seen nearest to each solid.
+#[derive(Debug, Clone)]
+pub(crate) struct LastTriangles(Vec<Cell<Option<usize>>>);
+
+impl LastTriangles {
+    pub(crate) fn new(n_solids: usize) -> Self {
+        Self(vec![Cell::new(None); n_solids])
     }
-    let cutoff = bound.max(0.0) + REACH;
-    surface.gap(solid, pose, cutoff).map_or(cutoff, |g| g.distance)
+
+    /// The gap of a solid, `cutoff` where it is that or more.
+    pub(crate) fn gap(
+        &self,
+        i: usize,
+        surface: &Surface,
+        solid: &Collider,
+        pose: &Isometry3<f64>,
+        cutoff: f64,
+    ) -> f64 {
+        let gap = surface.gap_from(solid, pose, cutoff, self.0[i].get());
+        self.0[i].set(gap.map(|g| g.triangle).or(self.0[i].get()));
+        gap.map_or(cutoff, |g| g.distance)
+    }
+
+    /// The gap of a solid, or a lower bound of it above [`NEAR`].
+    pub(crate) fn look(&self, i: usize, surface: &Surface, solid: &Collider, pose: &Isometry3<f64>) -> f64 {
+        let bound = surface.gap_lower_bound(solid, pose);
+        if bound > NEAR {
+            return bound;
+        }
+        self.gap(i, surface, solid, pose, bound.max(0.0) + REACH)
+    }
 }
 
 /// A hand that has come in.
@@ -49,6 +74,7 @@ pub(crate) fn arrive(
     let approach = Approach {
         hand,
         object,
+        near: LastTriangles::new(hand.solids.len()),
         start,
         direction,
     };
@@ -68,6 +94,7 @@ pub(crate) fn arrive(
 struct Approach<'a> {
     hand: &'a GraspHand<'a>,
     object: &'a GraspObject,
+    near: LastTriangles,
     /// Pose of each solid at s = 0, object frame.
     start: Vec<Isometry3<f64>>,
     /// Unit direction, object frame.
@@ -101,22 +128,21 @@ impl Approach<'_> {
 
 impl Motion for Approach<'_> {
     fn gap(&self, i: usize, s: f64, cutoff: f64) -> f64 {
-        let gap = self
-            .object
-            .surface()
-            .gap(&self.hand.solids[i].collider, &self.pose(i, s), cutoff);
-        gap.map_or(cutoff, |g| g.distance)
+        let solid = &self.hand.solids[i].collider;
+        self.near
+            .gap(i, self.object.surface(), solid, &self.pose(i, s), cutoff)
     }
 
     fn look(&self, i: usize, s: f64) -> f64 {
-        look(
-            self.object.surface(),
-            &self.hand.solids[i].collider,
-            &self.pose(i, s),
-        )
+        let solid = &self.hand.solids[i].collider;
+        self.near.look(i, self.object.surface(), solid, &self.pose(i, s))
     }
 
     fn speed(&self, _: usize) -> f64 {
+        1.0
+    }
+
+    fn closing_speed(&self, _: usize) -> f64 {
         1.0
     }
 

@@ -6,6 +6,7 @@ use prehend_quality::EpsilonSolver;
 
 use crate::approach::arrive;
 use crate::closing::{Posture, close_fingers, self_collides};
+use crate::confirm::{Confirmed, confirmed, deepest};
 use crate::contacts::contacts_of;
 use crate::grasp_hand::GraspHand;
 use crate::measure::{checked_contacts, epsilon_of};
@@ -33,7 +34,7 @@ pub struct Closed {
     pub epsilon: f64,
     /// How much of the object stays free.
     pub free_volume: FreeVolume,
-    /// How deep a link reaches into the object, metres: 0 but for a candidate that starts inside.
+    /// How deep a link reaches into the object, metres, by exact distances: 0 but for a candidate that starts inside.
     pub penetration: f64,
     /// Why it is no grasp; `None` where it is one.
     pub reason: Option<Reason>,
@@ -144,11 +145,16 @@ fn closed(
         }
     }
     // A candidate may stand with all of a link inside the object, where no surface is near.
-    let sunk = standing_depth(model, object, &standing) > 0.0;
-    let Some(posture) = (!sunk)
-        .then(|| close_fingers(model, object, &pose, preshape).ok())
-        .flatten()
-    else {
+    let sunk = deepest(model, object, &standing.solid_poses) > 0.0;
+    let closed = || {
+        let posture = close_fingers(model, object, &pose, preshape).ok()?;
+        match confirmed(model, object, &pose, preshape, &posture) {
+            Confirmed::Clear => Some(posture),
+            Confirmed::BackedOff(opened) => Some(opened),
+            Confirmed::Stuck => None,
+        }
+    };
+    let Some(posture) = (!sunk).then(closed).flatten() else {
         return Ok(rejected(
             model,
             object,
@@ -170,7 +176,7 @@ fn closed(
     let points: Vec<_> = contacts.iter().map(|c| c.at.point).collect();
     Ok(Closed {
         object_from_root: pose,
-        penetration: standing_depth(model, object, &posture),
+        penetration: deepest(model, object, &posture.solid_poses),
         joints: posture.joints,
         free_volume: free_volume(&palm, &points, object.leaves()),
         contacts,
@@ -181,26 +187,10 @@ fn closed(
 
 /// The hand where it stands, open.
 fn standing(hand: &GraspHand<'_>, object_from_root: &Isometry3<f64>, preshape: &JointPositions) -> Posture {
-    let poses = hand.all_poses(preshape);
-    let solid_poses = hand
-        .solids
-        .iter()
-        .map(|s| object_from_root * poses[s.link.0] * s.link_from_solid)
-        .collect();
     Posture {
         joints: preshape.clone(),
-        solid_poses,
+        solid_poses: hand.solid_poses(object_from_root, preshape),
     }
-}
-
-/// The deepest that any link reaches into the object.
-fn standing_depth(hand: &GraspHand<'_>, object: &GraspObject, posture: &Posture) -> f64 {
-    let depths = hand
-        .solids
-        .iter()
-        .zip(&posture.solid_poses)
-        .map(|(s, pose)| object.surface().depth(&s.collider, pose));
-    depths.fold(0.0, f64::max)
 }
 
 fn rejected(
@@ -212,7 +202,7 @@ fn rejected(
 ) -> Closed {
     Closed {
         object_from_root: *object_from_root,
-        penetration: standing_depth(hand, object, &posture),
+        penetration: deepest(hand, object, &posture.solid_poses),
         joints: posture.joints,
         contacts: Vec::new(),
         epsilon: 0.0,

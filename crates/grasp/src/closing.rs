@@ -1,14 +1,14 @@
 //! The fingers close: each joint until a link on it touches, distal joints going on.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
-use nalgebra::Isometry3;
-use prehend_hand::JointPositions;
+use nalgebra::{Isometry3, Point3, Vector3};
+use prehend_hand::{JointKind, JointPositions};
 
 use crate::GraspObject;
-use crate::approach::{self, LEAST_STEP};
-use crate::first_touch::{CLEARANCE, Motion, NEAR, TOUCH, Track, first_touch};
-use crate::grasp_hand::GraspHand;
+use crate::approach::{LEAST_STEP, LastTriangles};
+use crate::first_touch::{CLEARANCE, Motion, NEAR, TOUCH, Touch, Track, first_touch};
+use crate::grasp_hand::{GraspHand, LinkSolid};
 
 /// A link that touches is moved by this much (m) to see whether its gap shrinks.
 const PROBE: f64 = 5e-5;
@@ -16,6 +16,12 @@ const PROBE: f64 = 5e-5;
 const PRESSING: f64 = 0.02;
 /// No joint turns or slides farther than this while closing, whatever its limits.
 const MOST_TRAVEL: f64 = std::f64::consts::TAU;
+/// The sine of an angle between axes that count as parallel: descriptions round angles.
+const PARALLEL: f64 = 1e-5;
+/// By so much such axes turn at most while others turn by [`MOST_TRAVEL`].
+const DRIFT: f64 = PARALLEL * MOST_TRAVEL;
+/// Links whose bounding balls are farther apart than this need no closer look, metres.
+const ROUGH: f64 = 0.02;
 /// Distances between links are looked for up to this, metres.
 const FAR: f64 = 0.05;
 /// A pair that touches this often while sliding along is stopped.
@@ -54,18 +60,18 @@ pub(crate) fn close_fingers(
             break;
         }
         let touch = first_touch(&closing, &mut tracks, closing.s0, end)?;
-        let old_speeds = closing.speeds.clone();
+        let old_speeds: Vec<f64> = (0..n_pairs).map(|i| closing.closing_speed(i)).collect();
         closing.move_to(touch.s);
         if let Some(i) = touch.pair {
             touches[i] += 1;
-            let stops = touch.pressed || touches[i] > MOST_TOUCHES || closing.presses(i, touch.s);
+            let stops = touch.pressed || touches[i] > MOST_TOUCHES || closing.presses(i, &touch);
             if stops {
                 closing.stop(i);
             }
             tracks[i].grazing = !stops;
         }
         for (i, track) in tracks.iter_mut().enumerate() {
-            track.go_on_from(touch.s, old_speeds[i], closing.speeds[i], closing.least_step(i));
+            track.go_on_from(touch.s, old_speeds[i], &closing, i);
         }
     }
     let joints = hand.hand.joint_positions_from_slice(&closing.q0);
@@ -88,6 +94,19 @@ struct Closing<'a> {
     last_poses: RefCell<Vec<LastPose>>,
     /// For each link, whether it stays where it is.
     still: Vec<bool>,
+    near: LastTriangles,
+    /// For each joint that moves, the direction of its axis if that stays as it is, object frame; else zero.
+    axes: Vec<Vector3<f64>>,
+    /// For each pair of solids, what the last look at it saw.
+    seen_apart: Vec<Cell<SeenApart>>,
+}
+
+/// A unit direction (object frame) along which two solids were seen apart, zero for none, and a bound of how fast their
+/// gap along it shrinks.
+#[derive(Debug, Clone, Copy)]
+struct SeenApart {
+    direction: Vector3<f64>,
+    closing_speed: f64,
 }
 
 /// A link's pose at `s`: infinite where the link stays, not a number where none is known.
@@ -116,6 +135,15 @@ impl<'a> Closing<'a> {
             speeds: Vec::new(),
             last_poses: RefCell::new(Vec::new()),
             still: Vec::new(),
+            near: LastTriangles::new(hand.solids.len()),
+            axes: Vec::new(),
+            seen_apart: vec![
+                Cell::new(SeenApart {
+                    direction: Vector3::zeros(),
+                    closing_speed: f64::INFINITY
+                });
+                hand.pairs.len()
+            ],
         };
         closing.settle();
         closing
@@ -148,6 +176,73 @@ impl<'a> Closing<'a> {
         };
         self.speeds
             .extend(hand.solid_shares.iter().chain(&hand.pair_shares).map(speed));
+        self.axes = (0..self.rates.len())
+            .map(|joint| self.steady_axis(joint))
+            .collect();
+    }
+
+    /// How fast a joint moves, itself or with the one that drives it.
+    fn rate(&self, joint: usize) -> f64 {
+        let node = &self.hand.joints()[joint];
+        self.rates[node.leader] * node.multiplier
+    }
+
+    /// The direction of a moving joint's axis, where the moving joints before it turn about parallel axes; else zero.
+    fn steady_axis(&self, joint: usize) -> Vector3<f64> {
+        let hand = self.hand;
+        if self.rate(joint) == 0.0 {
+            return Vector3::zeros();
+        }
+        let axis_of = |joint: usize| hand.axis(joint, |link| self.link_pose(link, self.s0));
+        let axis = axis_of(joint);
+        let turns_it = |other: usize| {
+            self.rate(other) != 0.0
+                && hand.joints()[other].kind != JointKind::Prismatic
+                && axis_of(other).cross(&axis).norm() > PARALLEL
+        };
+        let child = hand.hand.joints()[joint].child.0;
+        if hand.joints_to(child).any(turns_it) {
+            Vector3::zeros()
+        } else {
+            axis
+        }
+    }
+
+    /// A bound of how fast the gap of two solids along a direction shrinks: a turning joint moves no point along its axis.
+    fn speed_along(&self, pair: usize, direction: &Vector3<f64>) -> f64 {
+        if *direction == Vector3::zeros() {
+            return self.speeds[self.hand.solids.len() + pair];
+        }
+        let of_joint = |&(joint, reach): &(usize, f64)| {
+            let axis = self.axes[joint];
+            let share = if axis == Vector3::zeros() {
+                1.0
+            } else if self.hand.joints()[joint].kind == JointKind::Prismatic {
+                axis.dot(direction).abs()
+            } else {
+                axis.cross(direction).norm()
+            };
+            self.rate(joint).abs() * reach * (share + DRIFT).min(1.0)
+        };
+        self.hand.pair_reaches[pair].iter().map(of_joint).sum()
+    }
+
+    /// The one axis that every joint which moves the pair turns about, if there is one.
+    fn common_axis(&self, pair: usize) -> Option<Vector3<f64>> {
+        let mut moving = self.hand.pair_reaches[pair]
+            .iter()
+            .map(|(joint, _)| *joint)
+            .filter(|joint| self.rate(*joint) != 0.0);
+        let first = self.axes[moving.next()?];
+        let is_same = |joint: usize| {
+            self.axes[joint] != Vector3::zeros()
+                && self.hand.joints()[joint].kind != JointKind::Prismatic
+                && self.axes[joint].cross(&first).norm() <= PARALLEL
+        };
+        let all = self.hand.pair_reaches[pair]
+            .iter()
+            .all(|(joint, _)| self.rate(*joint) == 0.0 || is_same(*joint));
+        all.then_some(first)
     }
 
     /// How much longer a joint can move.
@@ -208,11 +303,12 @@ impl<'a> Closing<'a> {
     }
 
     /// Whether moving on would bring pair `i` closer.
-    fn presses(&self, i: usize, s: f64) -> bool {
+    fn presses(&self, i: usize, touch: &Touch) -> bool {
         if self.speeds[i] == 0.0 {
             return false;
         }
-        let now = self.gap(i, s, NEAR);
+        let s = touch.s;
+        let now = touch.gap.unwrap_or_else(|| self.gap(i, s, NEAR));
         let later = self.gap(i, s + PROBE / self.speeds[i], NEAR);
         later < now - PRESSING * PROBE || later <= CLEARANCE
     }
@@ -237,11 +333,9 @@ impl Motion for Closing<'_> {
         let hand = self.hand;
         match i.checked_sub(hand.solids.len()) {
             None => {
-                let gap = self
-                    .object
-                    .surface()
-                    .gap(&hand.solids[i].collider, &self.pose(i, s), cutoff);
-                gap.map_or(cutoff, |g| g.distance)
+                let solid = &hand.solids[i].collider;
+                self.near
+                    .gap(i, self.object.surface(), solid, &self.pose(i, s), cutoff)
             }
             Some(pair) => {
                 let (a, b) = hand.pairs[pair];
@@ -258,20 +352,59 @@ impl Motion for Closing<'_> {
     fn look(&self, i: usize, s: f64) -> f64 {
         let hand = self.hand;
         let Some(pair) = i.checked_sub(hand.solids.len()) else {
-            return approach::look(self.object.surface(), &hand.solids[i].collider, &self.pose(i, s));
+            let solid = &hand.solids[i].collider;
+            return self.near.look(i, self.object.surface(), solid, &self.pose(i, s));
         };
         let (a, b) = hand.pairs[pair];
-        let (first, second) = (&hand.solids[a].collider, &hand.solids[b].collider);
-        let (ball_a, ball_b) = (first.bounding_ball(), second.bounding_ball());
-        let (pose_a, pose_b) = (self.pose(a, s), self.pose(b, s));
-        let between = pose_a * ball_a.center - pose_b * ball_b.center;
-        let bound = between.norm() - ball_a.radius - ball_b.radius;
-        if bound > NEAR {
-            return bound;
+        let (first, second) = (&hand.solids[a], &hand.solids[b]);
+        let center = |solid: &LinkSolid| -> Point3<f64> { self.link_pose(solid.link.0, s) * solid.center };
+        let between = center(second) - center(first);
+        let radii = first.collider.bounding_ball().radius + second.collider.bounding_ball().radius;
+        let seen = |gap: f64, direction: Vector3<f64>| {
+            let closing_speed = self.speed_along(pair, &direction);
+            self.seen_apart[pair].set(SeenApart {
+                direction,
+                closing_speed,
+            });
+            gap
+        };
+        if between.norm() - radii > ROUGH {
+            return seen(between.norm() - radii, between.normalize());
         }
-        first
-            .distance_to(second, &pose_a.inv_mul(&pose_b), FAR)
-            .unwrap_or(FAR)
+        let pose = self.pose(a, s);
+        let a_from_b = pose.inv_mul(&self.pose(b, s));
+        let along = |direction: &Vector3<f64>| {
+            let in_a = pose.rotation.inverse_transform_vector(direction);
+            first.collider.apart_along(&second.collider, &a_from_b, &in_a)
+        };
+        // Fingers side by side move across what is between them.
+        if let Some(axis) = self.common_axis(pair) {
+            let axis = if axis.dot(&between) < 0.0 { -axis } else { axis };
+            let gap = along(&axis);
+            if gap > NEAR {
+                return seen(gap, axis);
+            }
+        }
+        let last = self.seen_apart[pair].get().direction;
+        if !first.collider.is_quick_to(&second.collider) && last != Vector3::zeros() {
+            let gap = along(&last);
+            if gap > NEAR {
+                return seen(gap, last);
+            }
+        }
+        let found = first
+            .collider
+            .distance_and_direction(&second.collider, &a_from_b, FAR);
+        let (gap, direction) = found.unwrap_or((FAR, None));
+        seen(gap, direction.map_or_else(Vector3::zeros, |d| pose.rotation * d))
+    }
+
+    fn closing_speed(&self, i: usize) -> f64 {
+        match i.checked_sub(self.hand.solids.len()) {
+            None => self.speeds[i],
+            // Joints stop and never start: what was a bound stays one.
+            Some(pair) => self.speeds[i].min(self.seen_apart[pair].get().closing_speed),
+        }
     }
 
     fn speed(&self, i: usize) -> f64 {

@@ -10,14 +10,19 @@ pub(crate) const CLEARANCE: f64 = 1e-6;
 /// A gap larger than this need not be known exactly to choose the next step, metres.
 pub(crate) const NEAR: f64 = 2.5e-3;
 
+/// No gap counts as shrinking slower than this, metres per unit of s: what does not change does not but for rounding.
+const SLOWEST: f64 = 1e-9;
+
 /// Gaps between pairs of bodies that move with one parameter s.
 pub(crate) trait Motion {
     /// The gap of pair `i` at `s`, metres: 0 or less where the two overlap, `cutoff` where it is that or more.
     fn gap(&self, i: usize, s: f64, cutoff: f64) -> f64;
     /// The same, or any lower bound of it above [`NEAR`].
     fn look(&self, i: usize, s: f64) -> f64;
-    /// A bound of how fast the gap of pair `i` can change, metres per unit of s; 0 where it does not move.
+    /// A bound of how fast points of pair `i` move against each other, metres per unit of s; 0 where it does not move.
     fn speed(&self, i: usize) -> f64;
+    /// A bound of how fast what the last look at pair `i` saw can shrink, at most its speed.
+    fn closing_speed(&self, i: usize) -> f64;
     /// Where the gap is small, the pair moves this far between two looks, metres: less than the bodies are thick, so
     /// that none can be hopped over.
     fn least_step(&self, i: usize) -> f64;
@@ -48,19 +53,20 @@ impl Track {
     }
 
     /// Whether the pair cannot overlap at `s`.
-    fn is_apart_at(&self, s: f64, speed: f64) -> bool {
-        s == self.seen || self.gap - speed * (s - self.seen).abs() > CLEARANCE
+    fn is_apart_at(&self, s: f64, closing_speed: f64) -> bool {
+        s == self.seen || self.gap - closing_speed * (s - self.seen).abs() > CLEARANCE
     }
 
     /// The motion goes on from `s` in another way: what was seen of the old way beyond `s` no longer counts.
-    pub(crate) fn go_on_from(&mut self, s: f64, old_speed: f64, speed: f64, least_step: f64) {
-        self.gap = (self.gap - old_speed * (s - self.seen).abs()).max(0.0);
+    pub(crate) fn go_on_from(&mut self, s: f64, old_closing_speed: f64, motion: &impl Motion, i: usize) {
+        self.gap = (self.gap - old_closing_speed * (s - self.seen).abs()).max(0.0);
         self.seen = s;
-        let sure_step = self.gap - TOUCH / 2.0;
+        let speed = motion.speed(i);
+        let sure_step = (self.gap - TOUCH / 2.0) / motion.closing_speed(i).max(SLOWEST);
         self.due = if speed == 0.0 {
             f64::INFINITY
-        } else if sure_step >= least_step {
-            rounded(s, sure_step / speed)
+        } else if sure_step >= motion.least_step(i) / speed {
+            rounded(s, sure_step)
         } else {
             s
         };
@@ -105,6 +111,8 @@ pub(crate) struct Touch {
     pub(crate) pair: Option<usize>,
     /// The pair was grazing and would overlap a little later.
     pub(crate) pressed: bool,
+    /// The pair's gap there, metres, if it was asked for.
+    pub(crate) gap: Option<f64>,
 }
 
 /// The least s from `start` up to `end` at which a pair's gap is in ([`CLEARANCE`], [`TOUCH`]]; pairs that graze must want
@@ -129,6 +137,7 @@ pub(crate) fn first_touch(
             s: end,
             pair: None,
             pressed: false,
+            gap: None,
         },
     };
     let moving: Vec<usize> = (0..search.tracks.len())
@@ -144,8 +153,9 @@ pub(crate) fn first_touch(
         looks.push(of_pair(search.tracks, look.pair));
     }
     // Who may have met between two looks is looked at where the others stop.
-    let is_open =
-        |search: &Search<'_, _>, i: usize| !search.tracks[i].is_apart_at(search.touch.s, motion.speed(i));
+    let is_open = |search: &Search<'_, _>, i: usize| {
+        !search.tracks[i].is_apart_at(search.touch.s, motion.closing_speed(i))
+    };
     while let Some(&i) = moving.iter().find(|i| is_open(&search, **i)) {
         search.look_at(i, search.touch.s)?;
     }
@@ -165,16 +175,21 @@ impl<M: Motion> Search<'_, M> {
     fn look_at(&mut self, i: usize, s: f64) -> Result<(), usize> {
         let track = &mut self.tracks[i];
         let gap = self.motion.look(i, s);
-        let mut at = s;
+        let (mut at, mut at_gap) = (s, Some(gap));
         if gap <= CLEARANCE {
             if s <= self.start {
                 return Err(i);
             }
-            let free = if track.seen < s { track.seen } else { self.start };
-            at = last_free(self.motion, i, free, s);
+            let free = if track.seen < s {
+                (track.seen, track.gap)
+            } else {
+                (self.start, 0.0)
+            };
+            (at, at_gap) = last_free(self.motion, i, free, (s, gap));
         } else if gap > TOUCH || track.grazing {
             track.grazing &= gap <= TOUCH;
-            let step = (gap - TOUCH / 2.0).max(self.motion.least_step(i)) / self.motion.speed(i);
+            let sure_step = (gap - TOUCH / 2.0) / self.motion.closing_speed(i).max(SLOWEST);
+            let step = sure_step.max(self.motion.least_step(i) / self.motion.speed(i));
             (track.seen, track.gap, track.due) = (s, gap, rounded(s, step));
             return Ok(());
         }
@@ -183,6 +198,7 @@ impl<M: Motion> Search<'_, M> {
             s: at,
             pair: Some(i),
             pressed,
+            gap: at_gap,
         };
         *track = Track {
             grazing: pressed,
@@ -192,25 +208,42 @@ impl<M: Motion> Search<'_, M> {
     }
 }
 
-/// Between `free` (apart) and `overlapping`: a parameter at which the gap is within the touching range.
-fn last_free(motion: &impl Motion, i: usize, free: f64, overlapping: f64) -> f64 {
-    let (mut low, mut high) = (free, overlapping);
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if middle <= low || middle >= high {
+/// Between `free` (apart) and `overlapping`, each with its gap: a parameter at which the gap is within the touching range,
+/// and the gap there if it was looked at.
+///
+/// The place where a straight line between the two gaps says that they touch, and the middle, in turns.
+fn last_free(
+    motion: &impl Motion,
+    i: usize,
+    free: (f64, f64),
+    overlapping: (f64, f64),
+) -> (f64, Option<f64>) {
+    let ((mut low, mut low_gap), (mut high, mut high_gap)) = (free, overlapping);
+    let mut seen = None;
+    for turn in 0..60 {
+        let share = (low_gap - TOUCH / 2.0) / (low_gap - high_gap);
+        let by_line = low + (high - low) * share;
+        let is_within = turn % 2 == 0 && share.is_finite() && by_line > low && by_line < high;
+        let at = if is_within {
+            by_line
+        } else {
+            f64::midpoint(low, high)
+        };
+        if at <= low || at >= high {
             break;
         }
-        let gap = motion.gap(i, middle, NEAR);
+        let gap = motion.gap(i, at, NEAR);
         if gap <= CLEARANCE {
-            high = middle;
+            (high, high_gap) = (at, gap);
         } else {
-            low = middle;
+            (low, low_gap) = (at, gap);
+            seen = Some(gap);
             if gap <= TOUCH {
                 break;
             }
         }
     }
-    low
+    (low, seen)
 }
 
 #[cfg(test)]
@@ -236,6 +269,9 @@ mod tests {
         }
         fn speed(&self, i: usize) -> f64 {
             self.speeds[i] * 1.7
+        }
+        fn closing_speed(&self, i: usize) -> f64 {
+            self.speeds[i] * 1.2
         }
     }
 
@@ -264,7 +300,8 @@ mod tests {
             Touch {
                 s: 0.2,
                 pair: None,
-                pressed: false
+                pressed: false,
+                gap: None
             }
         );
     }

@@ -1,6 +1,6 @@
 //! A hand made ready for closing: its solids, its tree of links, and how fast each can move.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use prehend_geometry::{Collider, Solid};
 use prehend_hand::{Description, Hand, JointIdx, JointKind, JointPositions, LinkIdx};
 use prehend_quality::{Material, friction_coefficient, soft_torsion_default};
@@ -23,6 +23,9 @@ pub(crate) struct GraspHand<'a> {
     pub(crate) solid_shares: Vec<Vec<(usize, f64)>>,
     /// For each of `pairs`: the free joints that move one solid against the other, likewise.
     pub(crate) pair_shares: Vec<Vec<(usize, f64)>>,
+    /// For each of `pairs`: the joints, driven ones too, that move one solid against the other, and the solid's reach from
+    /// each, metres; 1 for a sliding joint.
+    pub(crate) pair_reaches: Vec<Vec<(usize, f64)>>,
     /// Pairs of solids that may collide with each other.
     pub(crate) pairs: Vec<(usize, usize)>,
     /// For each of them: how far (m) the two may move towards each other between two looks, less than they are thick.
@@ -37,6 +40,8 @@ pub(crate) struct LinkSolid {
     pub(crate) link: LinkIdx,
     pub(crate) link_from_solid: Isometry3<f64>,
     pub(crate) collider: Collider,
+    /// Middle of its bounding ball, the link's frame.
+    pub(crate) center: Point3<f64>,
     pub(crate) may_touch: bool,
     pub(crate) material: Material,
     /// Length (m) that fits into the solid everywhere but near its edges.
@@ -53,7 +58,7 @@ struct LinkNode {
 
 #[derive(Debug, Clone)]
 pub(crate) struct JointNode {
-    kind: JointKind,
+    pub(crate) kind: JointKind,
     axis: UnitVector3<f64>,
     /// The free joint that drives this one, and its share: itself and 1 unless it mimics.
     pub(crate) leader: usize,
@@ -90,6 +95,7 @@ impl<'a> GraspHand<'a> {
                 solids.push(LinkSolid {
                     link: LinkIdx(idx),
                     link_from_solid: placed.link_from_solid,
+                    center: placed.link_from_solid * collider.bounding_ball().center,
                     collider,
                     may_touch: description.contact_links.contains(&LinkIdx(idx)),
                     material,
@@ -107,6 +113,7 @@ impl<'a> GraspHand<'a> {
             joints,
             solid_shares: Vec::new(),
             pair_shares: Vec::new(),
+            pair_reaches: Vec::new(),
             pairs: Vec::new(),
             pair_least_steps: Vec::new(),
             palm_width: 0.0,
@@ -127,8 +134,9 @@ impl<'a> GraspHand<'a> {
                     let is_of = |solid: usize, joint: usize| reaches[solid].iter().any(|(k, _)| *k == joint);
                     let of_first = reaches[i].iter().filter(|(joint, _)| !is_of(j, *joint));
                     let of_second = reaches[j].iter().filter(|(joint, _)| !is_of(i, *joint));
-                    let shares = model.by_leader(of_first.chain(of_second));
-                    model.pair_shares.push(shares);
+                    let of_both: Vec<(usize, f64)> = of_first.chain(of_second).copied().collect();
+                    model.pair_shares.push(model.by_leader(of_both.iter()));
+                    model.pair_reaches.push(of_both);
                 }
             }
         }
@@ -174,6 +182,22 @@ impl<'a> GraspHand<'a> {
     /// Poses of all links in the root's frame.
     pub(crate) fn all_poses(&self, positions: &JointPositions) -> Vec<Isometry3<f64>> {
         self.hand.link_poses(positions).as_slice().to_vec()
+    }
+
+    /// Poses of all solids.
+    pub(crate) fn solid_poses(
+        &self,
+        object_from_root: &Isometry3<f64>,
+        joints: &JointPositions,
+    ) -> Vec<Isometry3<f64>> {
+        let poses = self.all_poses(joints);
+        let pose = |s: &LinkSolid| object_from_root * poses[s.link.0] * s.link_from_solid;
+        self.solids.iter().map(pose).collect()
+    }
+
+    /// Direction of a joint's axis, from the pose of the link that it moves.
+    pub(crate) fn axis(&self, joint: usize, pose_of_child: impl Fn(usize) -> Isometry3<f64>) -> Vector3<f64> {
+        pose_of_child(self.hand.joints()[joint].child.0) * self.joints[joint].axis.into_inner()
     }
 
     pub(crate) fn joints(&self) -> &[JointNode] {

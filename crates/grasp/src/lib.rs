@@ -52,6 +52,7 @@ mod patch;
 mod refine;
 
 mod close;
+mod confirm;
 mod measure;
 mod run_try;
 mod synthesis_options;

@@ -6,6 +6,7 @@ use prehend_quality::EpsilonSolver;
 
 use crate::approach::{Arrived, arrive};
 use crate::closing::{close_fingers, self_collides};
+use crate::confirm::{Confirmed, confirmed};
 use crate::grasp_hand::GraspHand;
 use crate::measure::{Closed, measured};
 use crate::refine::refined;
@@ -71,11 +72,19 @@ fn run_try(
         let posture =
             close_fingers(hand, object, &object_from_root, &preshape).map_err(|_| Reason::StartCollision);
         let grasp = posture.and_then(|posture| {
-            let closed = Closed {
+            let mut closed = Closed {
                 object_from_root,
                 posture,
             };
-            measured(hand, object, attempt, &closed, support_plane, solver)
+            let grasp = measured(hand, object, attempt, &closed, support_plane, solver)?;
+            match confirmed(hand, object, &object_from_root, &preshape, &closed.posture) {
+                Confirmed::Clear => Ok(grasp),
+                Confirmed::BackedOff(posture) => {
+                    closed.posture = posture;
+                    measured(hand, object, attempt, &closed, support_plane, solver)
+                }
+                Confirmed::Stuck => Err(Reason::StartCollision),
+            }
         });
         match grasp {
             Ok(grasp) => return Ok(grasp),
