@@ -1,10 +1,12 @@
 //! Hands meet objects: `grasps/HAND/OBJECT.parquet` and `OBJECT.rejected.json`.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use prehend_grasp::{Grasp, SynthesisOptions, synthesize, synthesize_each};
+use prehend_grasp::{Grasp, GraspObject, SynthesisOptions, synthesize, synthesize_each};
 use prehend_hand::Hand;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::decompose::Shape;
@@ -88,27 +90,39 @@ pub fn run(
     out: &Path,
     watch: Watch,
 ) -> Result<Vec<GraspFile>, Error> {
+    let n_tries: usize = hands.iter().map(|h| options[h.hand.name()].tries).sum();
+    watch.progress.begin("grasp", (n_tries * shapes.len()) as u64);
+    // Objects side by side, so that nobody waits while one is made ready; each is made ready once for all hands.
+    let of_shapes: Vec<Vec<Result<GraspFile, Error>>> = shapes
+        .par_iter()
+        .map(|shape| {
+            let ready = OnceCell::new();
+            let of_hand = |hand: &HandData| {
+                watch.check()?;
+                one(hand, shape, &ready, &options[hand.hand.name()], out, watch)
+            };
+            hands.iter().map(of_hand).collect()
+        })
+        .collect();
+    watch.check()?;
+    let mut of_shapes: Vec<_> = of_shapes.into_iter().map(Vec::into_iter).collect();
     let mut grasp_files = Vec::new();
     for hand in hands {
-        let options = &options[hand.hand.name()];
-        watch.progress.begin(
-            &format!("grasp with {}", hand.hand.name()),
-            (options.tries * shapes.len()) as u64,
-        );
-        for shape in shapes {
-            watch.check()?;
+        for (shape, results) in shapes.iter().zip(&mut of_shapes) {
             let what = format!("{} with {}", shape.object.name, hand.hand.name());
-            let result = one(hand, shape, options, out, watch);
-            grasp_files.extend(watch.or_left_out(&what, Some(&shape.object.path), result)?);
+            if let Some(result) = results.next() {
+                grasp_files.extend(watch.or_left_out(&what, Some(&shape.object.path), result)?);
+            }
         }
-        watch.progress.end();
     }
+    watch.progress.end();
     Ok(grasp_files)
 }
 
 fn one(
     hand: &HandData,
     shape: &Shape,
+    ready: &OnceCell<GraspObject>,
     options: &SynthesisOptions,
     out: &Path,
     watch: Watch,
@@ -140,7 +154,13 @@ fn one(
             tries,
         });
     }
-    let (mut frame, tries) = grasp(hand, shape, options, watch)?;
+    let grasp_object = if let Some(grasp_object) = ready.get() {
+        grasp_object
+    } else {
+        let grasp_object = shape.grasp_object()?;
+        ready.get_or_init(|| grasp_object)
+    };
+    let (mut frame, tries) = grasps_on(hand, shape, grasp_object, options, watch)?;
     // With enough grasps the rest of the tries need not be made.
     watch.progress.advance((options.tries - tries.tried) as u64);
     frame.metadata.insert("fingerprint".into(), fingerprint.clone());
@@ -170,7 +190,16 @@ pub fn grasp(
     options: &SynthesisOptions,
     watch: Watch,
 ) -> Result<(Frame, Tries), Error> {
-    let grasp_object = shape.grasp_object()?;
+    grasps_on(hand, shape, &shape.grasp_object()?, options, watch)
+}
+
+fn grasps_on(
+    hand: &HandData,
+    shape: &Shape,
+    grasp_object: &GraspObject,
+    options: &SynthesisOptions,
+    watch: Watch,
+) -> Result<(Frame, Tries), Error> {
     let report = |_finished: usize| {
         watch.progress.advance(1);
         watch.check().is_ok()
@@ -179,14 +208,14 @@ pub fn grasp(
         stream: stream(hand.hand.name(), &shape.object.name),
         ..options.clone()
     };
-    let synthesis = synthesize(&hand.hand, &grasp_object, &options, &report);
+    let synthesis = synthesize(&hand.hand, grasp_object, &options, &report);
     watch.check()?;
     let synthesis = synthesis.map_err(|e| Error::file(&shape.object.path, e))?;
     let context = TableContext {
         hand: &hand.hand,
         hand_path: &hand.path,
         object: &shape.object,
-        grasp_object: &grasp_object,
+        grasp_object,
         seed: options.seed,
     };
     let rejected = synthesis
