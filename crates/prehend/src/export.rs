@@ -41,12 +41,17 @@ pub struct ExportedGrasp {
     pub squeeze: Squeeze,
 }
 
-/// The grasps of a table that belong to this hand, with pre-grasp and squeeze.
+/// The grasps of a table that belong to this hand, with pre-grasp and a squeeze of normal forces that sum to `grip` (N).
 ///
 /// # Errors
 ///
 /// As [`records`] and [`squeeze`]; [`Error`] where the table has no `egpc` columns.
-pub fn exported(frame: &Frame, hand: &Hand, gains: &ServoGains) -> Result<Vec<ExportedGrasp>, Error> {
+pub fn exported(
+    frame: &Frame,
+    hand: &Hand,
+    gains: &ServoGains,
+    grip: f64,
+) -> Result<Vec<ExportedGrasp>, Error> {
     let egpc = [frame.numbers("egpc_1")?, frame.numbers("egpc_2")?];
     let records = records(frame, hand)?;
     records
@@ -58,7 +63,7 @@ pub fn exported(frame: &Frame, hand: &Hand, gains: &ServoGains) -> Result<Vec<Ex
             let approach = object_from_palm * Vector3::z();
             Ok(ExportedGrasp {
                 object_from_pregrasp: Translation3::from(-approach * STAND_OFF) * record.object_from_root,
-                squeeze: squeeze(hand, &record, gains)?,
+                squeeze: squeeze(hand, &record, gains, grip)?,
                 preshape,
                 approach,
                 record,

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use prehend::export::{
-    ServoGains, convex_pieces, exported, grasp_json, grasp_pictures, isaac_yaml, mjcf_scene, moveit_yaml,
+    GRIP, ServoGains, convex_pieces, exported, grasp_json, grasp_pictures, isaac_yaml, mjcf_scene,
+    moveit_yaml,
 };
 use prehend::files;
 use prehend::frame::Frame;
@@ -14,6 +15,7 @@ use prehend::object::{Object, ObjectOptions};
 use serde_json::{Map, Value, json};
 
 use super::grasps::Filter;
+use super::shape_input::positive;
 use crate::output::{self, Outcome};
 
 /// Write grasps in the formats of other programs
@@ -32,6 +34,10 @@ pub struct Arguments {
     /// What is written
     #[arg(long, value_enum)]
     format: Format,
+
+    /// Sum of the normal forces of the squeeze, N
+    #[arg(long, default_value_t = GRIP, value_parser = positive, allow_negative_numbers = true)]
+    grip: f64,
 
     /// The folder that gets the files: one for each hand and object, with mjcf one and with png two for each grasp
     #[arg(long)]
@@ -119,7 +125,7 @@ impl Arguments {
             return Ok(written);
         }
         let hand = read_described_hand(hand)?;
-        let grasps = exported(table, &hand, &ServoGains::default())?;
+        let grasps = exported(table, &hand, &ServoGains::default(), self.grip)?;
         *unbalanced += grasps.iter().filter(|g| g.squeeze.forces.is_none()).count();
         match self.format {
             Format::Json => {

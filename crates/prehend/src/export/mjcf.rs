@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use nalgebra::{Isometry3, Point3};
-use prehend_geometry::Solid;
+use prehend_geometry::{Solid, mass_properties};
 use prehend_hand::{Hand, JointIdx, JointKind, JointPositions, LinkIdx};
 use prehend_quality::{Material, friction_coefficient, soft_torsion_default};
 use quick_xml::Writer;
@@ -50,6 +50,9 @@ impl Default for ServoGains {
 /// world (the object's frame); the object free, as convex pieces. Touch is by explicit pairs of links and pieces only,
 /// with the friction of their materials; a soft contact's torsion length times μ is MuJoCo's torsional friction. A joint
 /// whose coupling lets go has a servo of its own.
+///
+/// Where the object's file states its centre of mass, it is there, with the inertia of a uniform solid; else the pieces
+/// are uniform.
 ///
 /// The keyframe `grasp` puts the hand into its posture and sends the servos to the squeeze.
 ///
@@ -275,6 +278,24 @@ impl<'a> Scene<'a> {
             .unwrap_or(DENSITY * total / (1.0 + pieces.volume_deviation));
         self.open("body", &[("name", "object".into())]);
         self.empty("freejoint", &[("name", "object".into())]);
+        let uniform = mass_properties(&object.mesh);
+        // Where the object's file says where its mass is, the pieces do not.
+        if let Some(center) = object.center_of_mass.filter(|_| uniform.volume > 0.0) {
+            let inertia = uniform.inertia * (mass / uniform.volume);
+            let [xx, yy, zz] = [inertia.m11, inertia.m22, inertia.m33];
+            let [xy, xz, yz] = [inertia.m12, inertia.m13, inertia.m23];
+            self.empty(
+                "inertial",
+                &[
+                    ("pos", format!("{} {} {}", center.x, center.y, center.z)),
+                    ("mass", mass.to_string()),
+                    (
+                        "fullinertia",
+                        format!("{xx:e} {yy:e} {zz:e} {xy:e} {xz:e} {yz:e}"),
+                    ),
+                ],
+            );
+        }
         for (k, (_, volume)) in pieces.pieces.iter().enumerate() {
             self.empty(
                 "geom",

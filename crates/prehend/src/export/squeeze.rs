@@ -8,8 +8,8 @@ use super::ServoGains;
 use crate::Error;
 use crate::grasp_table::GraspRecord;
 
-/// The sum of the normal forces of a squeeze, N.
-pub const GRIP: f64 = 30.0;
+/// The sum of the normal forces of a squeeze (N) where nobody says another: 30 N from either side, a firm hold.
+pub const GRIP: f64 = 60.0;
 /// Where the best forces leave more than this share of the grip as a wrench, there is no balanced squeeze.
 pub const IMBALANCE: f64 = 0.02;
 /// Without one, closing joints press with this share of their servo's largest torque or force.
@@ -26,7 +26,7 @@ pub struct Squeeze {
     pub joints: JointPositions,
     /// The contacts' forces; `None` where they cannot balance, and all closing joints press alike instead.
     pub forces: Option<InternalForces>,
-    /// The sum of the normal forces, N: [`GRIP`], or less where a servo's limit asks for it. 0 without balance.
+    /// The sum of the normal forces, N: as asked for, or less where a servo's limit asks for it. 0 without balance.
     pub grip: f64,
 }
 
@@ -40,7 +40,8 @@ pub struct Squeeze {
 /// target = q + τ / stiffness
 /// ```
 ///
-/// with f_c on the object and m_c its torsion about the normal n_c. A joint that mimics another adds multiplier × τ to its
+/// The normal forces sum to `grip` (N), so that a wrench up to ε × grip meets resistance without pressing harder.
+/// Above, f_c is the force on the object and m_c its torsion about the normal n_c. A joint that mimics another adds multiplier × τ to its
 /// leader's. Forces on links that no joint moves are held by the arm. All are scaled down where a servo could not give them.
 /// A grasp whose contacts leave more than [`IMBALANCE`] of the grip has no such forces: then every closing joint presses
 /// with 0.375 of its servo's largest torque in its closing direction.
@@ -48,7 +49,7 @@ pub struct Squeeze {
 /// # Errors
 ///
 /// Contacts with numbers that cannot be contacts; a hand without description.
-pub fn squeeze(hand: &Hand, grasp: &GraspRecord, gains: &ServoGains) -> Result<Squeeze, Error> {
+pub fn squeeze(hand: &Hand, grasp: &GraspRecord, gains: &ServoGains, grip: f64) -> Result<Squeeze, Error> {
     let description = hand
         .description()
         .ok_or_else(|| Error::input(format!("the hand {} has no hand.toml", hand.name())))?;
@@ -66,7 +67,7 @@ pub fn squeeze(hand: &Hand, grasp: &GraspRecord, gains: &ServoGains) -> Result<S
         None
     } else {
         let options = QualityOptions::new(grasp.wrench_center, grasp.torque_scale);
-        let found = internal_forces(&contacts, &options, GRIP)
+        let found = internal_forces(&contacts, &options, grip)
             .map_err(|e| Error::input(format!("grasp {}: {e}", grasp.grasp_id)))?;
         (found.imbalance <= IMBALANCE).then_some(found)
     };
@@ -74,14 +75,14 @@ pub fn squeeze(hand: &Hand, grasp: &GraspRecord, gains: &ServoGains) -> Result<S
         JointKind::Prismatic => gains.most_force,
         JointKind::Revolute | JointKind::Continuous => gains.most_torque,
     };
-    let (mut efforts, mut grip) = (vec![0.0; hand.joints().len()], 0.0);
+    let (mut efforts, mut reached) = (vec![0.0; hand.joints().len()], 0.0);
     let mut forces = forces;
     if let Some(forces) = &mut forces {
         efforts = efforts_of(hand, grasp, forces);
         let over = (0..efforts.len())
             .map(|j| efforts[j].abs() / limit(j))
             .fold(1.0, f64::max);
-        grip = GRIP / over;
+        reached = grip / over;
         for effort in &mut efforts {
             *effort = rounded(*effort / over);
         }
@@ -108,7 +109,7 @@ pub fn squeeze(hand: &Hand, grasp: &GraspRecord, gains: &ServoGains) -> Result<S
         efforts,
         targets,
         forces,
-        grip,
+        grip: reached,
     })
 }
 
