@@ -129,7 +129,9 @@ def settle(file, path, every):
 
 
 def score(file, path, every):
-    success = file["grasps/qualities/flex/object_in_gripper"][:][::every] > 0
+    flex = file["grasps/qualities/flex"]
+    success = flex["object_in_gripper"][:][::every] > 0
+    moved = flex["object_motion_during_closing_linear"][:][::every]
     closed = [json.loads(text) for text in open(path)]
     n = len(closed) // len(success)
     chosen = []
@@ -143,7 +145,8 @@ def score(file, path, every):
         s, e = success[these], epsilon[these]
         print(
             f"{name}: {len(s)} grasps, {s.sum()} succeeded; area under the curve {area(e, s):.3f}; "
-            f"force closure {np.mean(e[s] > 0):.2f} of those that succeeded, {np.mean(e[~s] > 0):.2f} of the others"
+            f"force closure {np.mean(e[s] > 0):.2f} of those that succeeded, {np.mean(e[~s] > 0):.2f} of the others; "
+            f"by how little the object moved while ACRONYM's gripper closed, {area(-moved[these], s):.3f}"
         )
     reasons = {}
     for c, s in zip(chosen, success):

@@ -20,6 +20,8 @@ import numpy as np
 SETTLE = 0.5
 PULL = 0.5
 MOVED = 0.03
+# What `prehend export` squeezes with, N.
+GRIP = 60.0
 
 
 def play(path):
@@ -44,6 +46,7 @@ def play(path):
         held.append(bool(moved < MOVED and data.ncon > 0 and np.isfinite(moved)))
     return {
         "scene": path,
+        "weight": 9.81 * float(model.body("object").mass[0]),
         "contacts_at_start": int(n_start),
         "depth_at_start": -float(min(start_depth, 0.0)),
         "moved_by_squeeze": shift,
@@ -72,16 +75,22 @@ def table(grasps, files):
     outcomes = [json.loads(text) for file in files for text in open(file)]
     for o in outcomes:
         o["epsilon"], o["place"] = epsilon[Path(o["scene"]).stem], place[Path(o["scene"]).stem]
+        o["ratio"] = GRIP * o["epsilon"] / o["weight"]
     print(summary(outcomes))
     for name in sorted(set(o["place"] for o in outcomes)):
         print(f"  {name}: {summary([o for o in outcomes if o['place'] == name])}")
     for low, high in ((0, 0.02), (0.02, 0.05), (0.05, 0.1), (0.1, 9)):
         these = [all(o["held"]) for o in outcomes if low <= o["epsilon"] < high]
         print(f"  epsilon {low} to {high}: {len(these)} grasps, {100 * np.mean(these) if these else 0:.0f} % hold")
+    for low, high in ((0, 0.1), (0.1, 0.25), (0.25, 0.5), (0.5, 1), (1, 2), (2, 99)):
+        these = [all(o["held"]) for o in outcomes if low <= o["ratio"] < high]
+        share = 100 * np.mean(these) if these else 0
+        print(f"  epsilon times grip over weight {low} to {high}: {len(these)} grasps, {share:.0f} % hold")
     held = np.array([all(o["held"]) for o in outcomes])
-    e = np.array([o["epsilon"] for o in outcomes])
-    wins = (e[held][:, None] > e[~held]).mean() + 0.5 * (e[held][:, None] == e[~held]).mean()
-    print(f"  area under the curve of epsilon against holding: {wins:.2f}")
+    for name in ("epsilon", "ratio"):
+        e = np.array([o[name] for o in outcomes])
+        wins = (e[held][:, None] > e[~held]).mean() + 0.5 * (e[held][:, None] == e[~held]).mean()
+        print(f"  area under the curve of {name} against holding: {wins:.2f}")
     for name, these in (("hold", held), ("fail", ~held)):
         moved = [o["moved_by_squeeze"] for o, h in zip(outcomes, these) if h]
         print(f"  those that {name}: moved by the squeeze {1000 * np.median(moved):.1f} mm in the median")
