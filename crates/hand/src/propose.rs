@@ -142,7 +142,7 @@ impl Hand {
         described.description = Some(description(&preshapes, 0.1));
         preshapes.keep_free(&described, &solids, &pairs);
         described.description = Some(description(&preshapes, 0.1));
-        let width = opening::opening_width(&anatomy, &described, &motion.thumb_side);
+        let width = opening::opening_width(&anatomy, &described, &motion.thumb_side).max(wraps.widest_held);
         let width_known = width > 1e-3;
         // A hand whose sides never stand apart on the palm's x still needs a width.
         let width = if width_known {
@@ -299,7 +299,7 @@ fn guesses(
         guess(
             "opening_width",
             width,
-            "the widest cylinder across the palm that both sides reach around, over all pre-shapes",
+            "the widest cylinder across the palm that both sides reach around, over all pre-shapes, or that closing held",
             Confidence::Medium.min(Confidence::of_margin(frame_margin)),
         );
     } else {

@@ -81,19 +81,23 @@ fn hull_corners(points: Vec<Point3<f64>>) -> Vec<Point3<f64>> {
     }
 }
 
-/// Corners of what of a hull is far from a point.
-fn far_part(points: Vec<Point3<f64>>, from: &Point3<f64>) -> Vec<Point3<f64>> {
+/// Corners of what of a hull is far from a point, not counting the way along a direction (unit, or 0).
+fn far_part(points: Vec<Point3<f64>>, from: &Point3<f64>, along: &Vector3<f64>) -> Vec<Point3<f64>> {
+    let away = |p: &Point3<f64>| {
+        let way = p - from;
+        way - along * along.dot(&way)
+    };
     let Ok(hull) = convex_hull(&points) else {
         return points;
     };
     let corners = hull.points();
     let Some(farthest) = corners
         .iter()
-        .max_by(|a, b| (*a - from).norm().total_cmp(&(*b - from).norm()))
+        .max_by(|a, b| away(a).norm().total_cmp(&away(b).norm()))
     else {
         return points;
     };
-    let out = farthest - from;
+    let out = away(farthest);
     let beyond = |p: &Point3<f64>| (p - from).dot(&out) - TIP_SHARE * out.norm_squared();
     let mut kept: Vec<Point3<f64>> = Vec::new();
     for &[a, b, c] in hull.triangles() {
@@ -465,14 +469,10 @@ impl<'a> Tree<'a> {
             .collect::<Vec<_>>();
         let joints: Vec<JointIdx> = way.iter().map(|(_, joint)| *joint).collect();
         let last = *joints.last()?;
-        let tip_points = if self.hand.joint(last).kind == crate::JointKind::Prismatic {
-            hull_corners(tip_points)
-        } else {
-            far_part(
-                tip_points,
-                &(tip_from_root * self.hand.joint_axis(last, &poses).0),
-            )
-        };
+        let (base, axis) = self.hand.joint_axis(last, &poses);
+        let slides = self.hand.joint(last).kind == crate::JointKind::Prismatic;
+        let along = tip_from_root * axis * f64::from(u8::from(slides));
+        let tip_points = far_part(tip_points, &(tip_from_root * base), &along);
         Some(Chain {
             flexion: self.flexion(&joints, zero),
             joints,

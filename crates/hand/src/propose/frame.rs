@@ -5,7 +5,7 @@ use prehend_geometry::{Surface, minimum_volume_box};
 
 use super::anatomy::{Anatomy, diagonal};
 use super::closing::{Motion, tip_center};
-use super::wrap::{Wraps, closing_order};
+use super::wrap::{Wraps, closing_order, cylinders};
 use crate::{JointKind, PalmFrame};
 
 /// A closing direction this near (cosine of 25°) to one of the palm's own axes is that axis.
@@ -19,6 +19,9 @@ const ACROSS: f64 = 0.5;
 const AGREE: f64 = 0.5;
 /// How much it counts that the fingers meet in front of the palm, beside the share of cylinders held.
 const IN_FRONT: f64 = 0.3;
+
+/// Looks on the way from open to where the sides meet.
+const WAY_LOOKS: usize = 8;
 
 /// A palm frame, and by how much its approach direction beat the next best.
 pub(super) struct Found {
@@ -36,8 +39,13 @@ pub(super) fn palm_frame(anatomy: &Anatomy<'_>, motion: &Motion) -> (Found, Wrap
     let (pinch, open) = motion.pinch_and_open();
     let (thumb, fingers) = sides_at(anatomy, motion, pinch);
     let meeting = nalgebra::center(&thumb, &fingers);
-    let (thumb_open, fingers_open) = sides_at(anatomy, motion, f64::midpoint(pinch, open));
-    let from_thumb = (fingers_open - thumb_open).try_normalize(1e-6);
+    // Where the fingers are, seen from the thumb: on the whole way from open to where they meet.
+    let looks = (0..WAY_LOOKS).map(|k| open + (pinch - open) * k as f64 / WAY_LOOKS as f64);
+    let between = looks.map(|t| {
+        let (thumb, fingers) = sides_at(anatomy, motion, t);
+        fingers - thumb
+    });
+    let from_thumb = between.sum::<Vector3<f64>>().try_normalize(1e-6);
     let turning = Turning::of(anatomy, motion);
 
     let mut axes: Vec<Vector3<f64>> = vec![Vector3::x(), Vector3::y(), Vector3::z()];
@@ -54,6 +62,7 @@ pub(super) fn palm_frame(anatomy: &Anatomy<'_>, motion: &Motion) -> (Found, Wrap
     let center = mean(&palm_points);
     let size = diagonal(&palm_points).max(1e-6);
     let closing = closing_order(anatomy, motion);
+    let cylinders = cylinders(motion);
     let mut found: Vec<(f64, PalmFrame, Wraps)> = candidates
         .into_iter()
         .map(|z| {
@@ -65,7 +74,7 @@ pub(super) fn palm_frame(anatomy: &Anatomy<'_>, motion: &Motion) -> (Found, Wrap
                 link: anatomy.palm,
                 link_from_palm: Isometry3::from_parts(origin.into(), rotation),
             };
-            let wraps = Wraps::new(anatomy, motion, &palm, &closing);
+            let wraps = Wraps::new(anatomy, motion, &palm, &closing, &cylinders);
             let forward = (meeting - center).try_normalize(1e-9).map_or(0.0, |f| f.dot(&z));
             let off = beside(&palm_points, &meeting, &z) / size;
             let held = wraps.n_held as f64 / wraps.n_cylinders as f64;

@@ -34,23 +34,34 @@ pub(super) struct Wraps {
     pub n_held: usize,
     /// How many there were.
     pub n_cylinders: usize,
+    /// Diameter (m) of the widest one that was held; 0 where none was.
+    pub widest_held: f64,
 }
 
 impl Wraps {
-    pub fn new(anatomy: &Anatomy<'_>, motion: &Motion, palm: &PalmFrame, closing: &[usize]) -> Self {
+    pub fn new(
+        anatomy: &Anatomy<'_>,
+        motion: &Motion,
+        palm: &PalmFrame,
+        closing: &[usize],
+        cylinders: &[Cylinder],
+    ) -> Self {
         let wrap = Wrap::new(anatomy, motion, closing);
-        let widest = motion.gaps.iter().copied().fold(0.0, f64::max) / 2.0;
         let reach = reach(anatomy, motion, palm);
         let (mut all, mut some) = (Vec::new(), Vec::new());
         let mut n_held = 0;
-        for step in 0..RADII {
-            let radius = (0.9 * widest * 8f64.powf(-(step as f64) / (RADII - 1) as f64)).max(1e-3);
+        let mut widest_held = 0.0_f64;
+        for cylinder in cylinders {
+            let radius = cylinder.radius;
             for share in HEIGHTS {
                 let height = (radius + 0.002).max(share * reach);
-                let Some(around) = wrap.around(palm, radius, height) else {
+                let Some(around) = wrap.around(palm, cylinder, height) else {
                     continue;
                 };
-                n_held += usize::from(around.held);
+                if around.held {
+                    n_held += 1;
+                    widest_held = widest_held.max(2.0 * radius);
+                }
                 if around.n_touching == anatomy.fingers.len() {
                     all.push(around.posture);
                 } else if around.n_touching > 1 {
@@ -64,9 +75,35 @@ impl Wraps {
         Self {
             postures: all,
             n_held,
-            n_cylinders: RADII * HEIGHTS.len(),
+            n_cylinders: cylinders.len() * HEIGHTS.len(),
+            widest_held,
         }
     }
+}
+
+/// What is closed around; its axis is its z.
+pub(super) struct Cylinder {
+    radius: f64,
+    solid: Collider,
+    surface: Surface,
+}
+
+/// Cylinders from nearly the widest gap between the sides down to an eighth of it.
+pub(super) fn cylinders(motion: &Motion) -> Vec<Cylinder> {
+    let widest = motion.gaps.iter().copied().fold(0.0, f64::max) / 2.0;
+    let radii = (0..RADII).map(|k| (0.9 * widest * 8f64.powf(-(k as f64) / (RADII - 1) as f64)).max(1e-3));
+    let cylinder = |radius: f64| {
+        let solid = Solid::Cylinder {
+            half_length: 0.5,
+            radius,
+        };
+        Some(Cylinder {
+            radius,
+            surface: Surface::new(solid.display_mesh()),
+            solid: Collider::new(&solid).ok()?,
+        })
+    };
+    radii.filter_map(cylinder).collect()
 }
 
 /// The free joints that close, finger by finger, from the palm outwards.
@@ -138,12 +175,7 @@ impl<'a> Wrap<'a> {
     }
 
     /// Closes on a cylinder across the palm; `None` where the open hand overlaps it.
-    fn around(&self, palm: &PalmFrame, radius: f64, height: f64) -> Option<Around> {
-        let solid = Solid::Cylinder {
-            half_length: 0.5,
-            radius,
-        };
-        let cylinder = Collider::new(&solid).ok()?;
+    fn around(&self, palm: &PalmFrame, cylinder: &Cylinder, height: f64) -> Option<Around> {
         let x = UnitVector3::new_normalize(Vector3::x());
         let across = UnitQuaternion::from_axis_angle(&x, -std::f64::consts::FRAC_PI_2);
         let palm_from_cylinder = Isometry3::from_parts(Translation3::new(0.0, 0.0, height), across);
@@ -164,7 +196,7 @@ impl<'a> Wrap<'a> {
         let is_near = |link: usize, in_links: &[Isometry3<f64>], tolerance: f64| {
             let gap = self.hulls[link]
                 .as_ref()
-                .and_then(|hull| hull.distance_to(&cylinder, &in_links[link], 0.01));
+                .and_then(|hull| hull.distance_to(&cylinder.solid, &in_links[link], 0.01));
             gap.is_some_and(|g| g <= tolerance)
         };
         let any_near = |links: &[usize], values: &[f64], tolerance: f64| {
@@ -189,7 +221,6 @@ impl<'a> Wrap<'a> {
             .iter()
             .filter(|f| f.links.iter().any(|l| touches(l.0)))
             .count();
-        let surface = Surface::new(solid.display_mesh());
         let mut angles: Vec<f64> = self
             .anatomy
             .fingers
@@ -198,12 +229,12 @@ impl<'a> Wrap<'a> {
             .filter(|l| touches(l.0))
             .filter_map(|l| {
                 let pose = in_links[l.0].inverse();
-                let gap = surface.gap(self.hulls[l.0].as_ref()?, &pose, 0.01)?;
+                let gap = cylinder.surface.gap(self.hulls[l.0].as_ref()?, &pose, 0.01)?;
                 let at = palm_from_cylinder * gap.on_surface;
                 Some((at.z - height).atan2(at.x))
             })
             .collect();
-        if height - radius < ON_PALM {
+        if height - cylinder.radius < ON_PALM {
             angles.push(-std::f64::consts::FRAC_PI_2);
         }
         self.open_again(&mut values);
