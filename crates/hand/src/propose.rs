@@ -18,7 +18,7 @@ mod text;
 mod wrap;
 
 use anatomy::{Anatomy, not_a_hand};
-use closing::Motion;
+use closing::{LEAST_OPPOSITION, Motion};
 use overlap::LinkSolids;
 use preshapes::{FEWEST, Preshapes, Spread};
 use wrap::Wraps;
@@ -105,7 +105,7 @@ impl Hand {
     pub fn propose_description(&self) -> Result<Proposal, HandError> {
         let anatomy = Anatomy::new(self)?;
         let motion = Motion::new(&anatomy);
-        if motion.opposition <= 1e-6 {
+        if motion.opposition <= LEAST_OPPOSITION {
             return Err(not_a_hand(
                 "moving its joints brings no finger nearer to another one or to the palm; check joint limits and axes",
             ));

@@ -3,6 +3,7 @@
 //! What else stands in the file (transmissions, simulators' elements, inertias, efforts) is not looked at, so that
 //! it may be incomplete.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use roxmltree::{Document, Node};
@@ -69,7 +70,8 @@ pub(crate) struct RawMimic {
 
 /// Reads the text.
 pub(crate) fn read(urdf: &str) -> Result<Robot, HandError> {
-    let document = parse(urdf)?;
+    let text = with_prefixes_declared(urdf);
+    let document = parse(&text)?;
     let robot = document.root_element();
     let mut links = Vec::new();
     let mut joints = Vec::new();
@@ -87,8 +89,28 @@ pub(crate) fn read(urdf: &str) -> Result<Robot, HandError> {
     })
 }
 
+/// Most prefixes that a file may use without declaring them.
+const MOST_PREFIXES: usize = 16;
+
+/// The text with a declaration in `<robot>` of each prefix (`drake:`, `xacro:`) that it uses without one.
+fn with_prefixes_declared(urdf: &str) -> Cow<'_, str> {
+    let mut text = Cow::Borrowed(urdf);
+    for _ in 0..MOST_PREFIXES {
+        let body = text.trim_start_matches('\u{feff}').trim_start();
+        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = Document::parse(body) else {
+            break;
+        };
+        let Some(at) = text.find("<robot").map(|at| at + "<robot".len()) else {
+            break;
+        };
+        let declaration = format!(" xmlns:{prefix}=\"{prefix}\"");
+        text.to_mut().insert_str(at, &declaration);
+    }
+    text
+}
+
 /// The document, with `<robot>` as its outermost element.
-pub(crate) fn parse(urdf: &str) -> Result<Document<'_>, HandError> {
+fn parse(urdf: &str) -> Result<Document<'_>, HandError> {
     // Some files start with an empty line, which XML forbids before its declaration.
     let body = urdf.trim_start_matches('\u{feff}').trim_start();
     let document = Document::parse(body).map_err(|error| HandError::Urdf {
@@ -263,7 +285,8 @@ pub fn urdf_below(urdf: &str, link: &str) -> Result<String, HandError> {
         .iter()
         .map(|j| (j.name.as_str(), j.parent.as_str()))
         .collect();
-    let document = parse(urdf)?;
+    let declared = with_prefixes_declared(urdf);
+    let document = parse(&declared)?;
     let text = document.input_text();
     let mut out = String::with_capacity(text.len());
     let mut done = 0;

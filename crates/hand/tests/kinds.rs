@@ -232,6 +232,33 @@ fn tongs_close_at_their_tips_though_their_hinges_are_as_near_as_ever() {
 }
 
 #[test]
+fn tongs_that_are_closed_at_0_close_towards_0() {
+    let limit = r#"<limit lower="0" upper="0.55"/>"#;
+    let urdf = Urdf::default()
+        .link("palm", [0.06, 0.06, 0.1], [0.0, 0.0, -0.05])
+        .link("left", [0.02, 0.01, 0.06], [0.0, 0.006, 0.03])
+        .link("right", [0.02, 0.01, 0.06], [0.0, -0.006, 0.03])
+        .joint(
+            "l",
+            "revolute",
+            ["palm", "left"],
+            ([0.0, 0.0, 0.01], 0.0),
+            "-1 0 0",
+            limit,
+        )
+        .joint(
+            "r",
+            "revolute",
+            ["palm", "right"],
+            ([0.0, 0.0, 0.01], 0.0),
+            "1 0 0",
+            limit,
+        );
+    let (hand, _) = described(&urdf.hand());
+    assert_eq!(closing(&hand), [("l".to_owned(), -1.0), ("r".to_owned(), -1.0)]);
+}
+
+#[test]
 fn one_jaw_closes_on_a_fixed_one() {
     let urdf = Urdf::default()
         .link("palm", [0.04, 0.12, 0.02], [0.0; 3])

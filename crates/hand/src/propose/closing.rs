@@ -15,6 +15,8 @@ const PALM_WEIGHT: f64 = 0.3;
 /// Fingers bend farther than they bend back. That a joint's range lies wholly on one side of 0 counts as much for its
 /// closing to that side as coming nearer by this length (m).
 const MORE_BENT: f64 = 0.03;
+/// Sides that come nearer each other by no more than this (m) do not oppose.
+pub(super) const LEAST_OPPOSITION: f64 = 1e-6;
 /// Beyond so many independent groups of fingers, each is judged alone.
 const MOST_TOGETHER: usize = 8;
 
@@ -42,6 +44,15 @@ struct Driven {
 
 impl Motion {
     pub fn new(anatomy: &Anatomy<'_>) -> Self {
+        let motion = Self::bending(anatomy, MORE_BENT);
+        if motion.opposition > LEAST_OPPOSITION {
+            return motion;
+        }
+        // Fingers that only open from 0 on.
+        Self::bending(anatomy, 0.0)
+    }
+
+    fn bending(anatomy: &Anatomy<'_>, more_bent: f64) -> Self {
         let groups = driven_groups(anatomy);
         let hand = anatomy.hand;
         let reference: Vec<f64> = hand
@@ -49,7 +60,7 @@ impl Motion {
             .iter()
             .map(|j| 0.0_f64.clamp(j.lower, j.upper))
             .collect();
-        let (direction, margin) = directions(anatomy, &groups, &reference);
+        let (direction, margin) = directions(anatomy, &groups, &reference, more_bent);
         let mut motion = Self {
             direction,
             reference,
@@ -59,7 +70,7 @@ impl Motion {
             gaps: Vec::new(),
         };
         motion.oppose(anatomy);
-        (motion.direction, motion.margin) = directions(anatomy, &groups, &motion.reference);
+        (motion.direction, motion.margin) = directions(anatomy, &groups, &motion.reference, more_bent);
         let sides = Sides::of(anatomy, &motion);
         motion.thumb_side = sides.thumb_side;
         motion.opposition = sides.closed;
@@ -206,7 +217,12 @@ fn driven_groups(anatomy: &Anatomy<'_>) -> Vec<Driven> {
 }
 
 /// The closing direction of every driven joint, and how clearly it won.
-fn directions(anatomy: &Anatomy<'_>, groups: &[Driven], reference: &[f64]) -> (Vec<f64>, f64) {
+fn directions(
+    anatomy: &Anatomy<'_>,
+    groups: &[Driven],
+    reference: &[f64],
+    more_bent: f64,
+) -> (Vec<f64>, f64) {
     let hand = anatomy.hand;
     let signed = |signs: &dyn Fn(usize) -> f64| {
         let mut direction = vec![0.0; hand.joints().len()];
@@ -283,7 +299,7 @@ fn directions(anatomy: &Anatomy<'_>, groups: &[Driven], reference: &[f64]) -> (V
                     0.0
                 }
             });
-            MORE_BENT * shares.sum::<f64>() / finger.flexion.len().max(1) as f64
+            more_bent * shares.sum::<f64>() / finger.flexion.len().max(1) as f64
         })
         .collect();
     let score = |side: &dyn Fn(usize) -> usize| {
