@@ -14,6 +14,8 @@ use crate::grasp_hand::GraspHand;
 
 /// Depths are exact to this, metres.
 const DEPTH_TOLERANCE: f64 = 1e-4;
+/// Winding number of what is inside for certain.
+const INSIDE: f64 = 0.9;
 /// At most so many links are backed off, one after the other.
 const MOST_REPAIRS: usize = 8;
 /// Halvings of the way back.
@@ -86,12 +88,14 @@ pub(crate) fn confirmed(
     Confirmed::Stuck
 }
 
-/// Whether a solid is apart from the surface, and not inside it.
+/// Whether a solid is apart from the surface, and not wholly inside it.
 fn is_clear(surface: &Surface, solid: &Collider, pose: &Isometry3<f64>) -> bool {
     let middle = pose * solid.bounding_ball().center;
     let is_apart = surface.gap_lower_bound(solid, pose) > CLEARANCE
         || surface.gap(solid, pose, CLEARANCE / 2.0).is_none();
-    is_apart && !surface.is_inside(&middle)
+    // What an open sheet is bent around counts as half inside: there a link may be.
+    let is_inside = || surface.is_inside(&middle) && surface.winding_number(&middle).abs() > INSIDE;
+    is_apart && !is_inside()
 }
 
 /// The deepest (m) that any link reaches into the object: 0 where, by exact gaps, none overlaps it.

@@ -5,7 +5,7 @@ mod exact;
 
 use std::path::{Path, PathBuf};
 
-use prehend_geometry::{DecomposeOptions, MeshFormat, decompose, read_mesh};
+use prehend_geometry::{DecomposeOptions, MeshFormat, TriMesh, decompose, read_mesh};
 use prehend_grasp::{CONTACT_TOLERANCE, GraspObject, SynthesisOptions, synthesize};
 use prehend_hand::Hand;
 use prehend_quality::Material;
@@ -51,16 +51,39 @@ fn object(path: &Path, scale: f64) -> GraspObject {
     GraspObject::new(mesh, &boxes, None, Material::Plastic).unwrap()
 }
 
+/// A hand that comes as a URDF and meshes, with the description that is worked out from them.
+fn foreign_hand(urdf: &Path) -> Hand {
+    let text = std::fs::read_to_string(urdf).unwrap();
+    let folder = urdf.parent().unwrap();
+    let resolve = |file: &str| std::fs::read(folder.join(file)).map_err(|e| e.to_string());
+    let hand = Hand::from_urdf(&text, &resolve).unwrap();
+    let toml = hand.propose_description().unwrap().hand_toml(&hand, "hand.urdf");
+    hand.with_description(&toml).unwrap()
+}
+
+/// How often a check of many tries makes those of the quick one.
+fn times() -> usize {
+    std::env::var("PREHEND_TIMES").map_or(1, |n| n.parse().expect("a number"))
+}
+
 /// Closes a hand on an object and checks every grasp.
 fn assert_sound(hand: &Hand, path: &Path, scale: f64, tries: usize) {
-    let object = object(path, scale);
-    let options = SynthesisOptions {
+    assert_sound_on(
+        hand,
+        &object(path, scale),
+        &path.file_stem().unwrap().display().to_string(),
         tries,
+    );
+}
+
+fn assert_sound_on(hand: &Hand, object: &GraspObject, name: &str, tries: usize) {
+    let options = SynthesisOptions {
+        tries: tries * times(),
         seed: 5,
         ..SynthesisOptions::default()
     };
-    let found = synthesize(hand, &object, &options, &|_| true).unwrap();
-    let what = format!("{} on {}", hand.name(), path.file_stem().unwrap().display());
+    let found = synthesize(hand, object, &options, &|_| true).unwrap();
+    let what = format!("{} on {name}", hand.name());
     assert!(!found.grasps.is_empty(), "{what}: {:?}", found.rejected);
     let mut worst = [0.0_f64; 3];
     for grasp in &found.grasps {
@@ -122,6 +145,57 @@ fn link_meshes_end_outside_scans_with_holes_and_faults() {
         (true, "glass/psb_m496.obj", 0.2),
     ] {
         assert_sound(&vendors_schunk(&shared, visual), &objects.join(file), scale, 16);
+    }
+}
+
+#[test]
+fn hands_described_from_their_urdf_end_outside_objects() {
+    let shared = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
+    if !shared.is_dir() {
+        eprintln!("skipped: hands described from their URDF needs ../shared/data");
+        return;
+    }
+    for (urdf, file, tries) in [
+        ("allegro_hand/allegro_hand_right.urdf", "bottle/beer_bottle", 3),
+        ("barrett_hand/bhand_model.urdf", "mug/coffee_mug", 4),
+        ("panda_gripper/panda_gripper.urdf", "mug/coffee_mug", 24),
+    ] {
+        let hand = foreign_hand(&shared.join("hands").join(urdf));
+        let path = top().join("objects").join(file).with_extension("ply");
+        assert_sound(&hand, &path, 1.0, tries);
+    }
+}
+
+#[test]
+fn walls_like_paper_and_open_sheets_are_not_hopped_over() {
+    // A sheet of 80 mm by 120 mm without thickness, bent to half a tube of 40 mm radius; and the same with 0.2 mm of wall.
+    let tube = |radii: &[f64]| {
+        let (n, half_length) = (24u32, 0.06);
+        let mut vertices = Vec::new();
+        let mut triangles = Vec::new();
+        for (layer, &radius) in radii.iter().enumerate() {
+            let first = vertices.len() as u32;
+            for i in 0..=n {
+                let (s, c) = (std::f64::consts::PI * f64::from(i) / f64::from(n)).sin_cos();
+                let at = |z: f64| nalgebra::Point3::new(radius * c, radius * s, z);
+                vertices.extend([at(-half_length), at(half_length)]);
+            }
+            for i in 0..n {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|k| first + 2 * i + k);
+                triangles.extend(match layer {
+                    0 => [[a, c, b], [b, c, d]],
+                    _ => [[a, b, c], [b, d, c]],
+                });
+            }
+        }
+        let mesh = TriMesh::new(vertices, triangles).unwrap();
+        let boxes = decompose(&mesh, &DecomposeOptions::default()).unwrap();
+        GraspObject::new(mesh, &boxes, None, Material::Plastic).unwrap()
+    };
+    for (name, tries) in [("human", 60), ("schunk_sdh", 24)] {
+        let hand = bundled_hand(name);
+        assert_sound_on(&hand, &tube(&[0.04]), "a sheet", tries);
+        assert_sound_on(&hand, &tube(&[0.04, 0.0398]), "a thin wall", tries);
     }
 }
 

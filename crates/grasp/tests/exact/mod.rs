@@ -54,7 +54,8 @@ fn depth_in(solid: &Solid, object_from_solid: &Isometry3<f64>, object: &[Triangl
     // Where no surfaces cross, one point of the solid tells whether all of it is inside the object.
     let of_solid = solid.display_mesh();
     let some_point = object_from_solid * of_solid.vertices()[0];
-    if winding(object, &some_point).abs() > 0.5 {
+    // Beside an open sheet that is bent around it a point counts as half inside.
+    if winding(object, &some_point).abs() > 0.9 {
         return f64::INFINITY;
     }
     // A display mesh may cut the corners of what is round.
