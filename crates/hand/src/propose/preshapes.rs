@@ -17,6 +17,12 @@ const OPPOSING: f64 = 0.5;
 /// Variance (rad² or m²) of a second direction that counts as one: a hundredth of the first one's.
 const SECOND: f64 = 0.01;
 
+/// Pre-shapes leave out this share of the extension, from its closed end: half-closed fingers meet an object before they
+/// are around it. And they go on by this share of it beyond the most open posture: of five hands on three objects, all kept
+/// more grasps so, by 18 to 136 %.
+const OPEN_SHARE: f64 = 0.5;
+const WIDER_SHARE: f64 = 0.125;
+
 /// A tenth of its range moves a spreading joint's fingertips apart by this much (m) at least, and by this share of what
 /// the joint that spreads most does.
 const LEAST_FAN: f64 = 5e-4;
@@ -109,6 +115,11 @@ impl Preshapes {
         if kind == Spread::SameDirection {
             eigengrasps[1].lower = eigengrasps[0].lower;
             eigengrasps[1].upper = eigengrasps[0].upper;
+        } else {
+            let extension = &mut eigengrasps[1];
+            let range = extension.upper - extension.lower;
+            extension.lower += OPEN_SHARE * range;
+            extension.upper += WIDER_SHARE * range;
         }
         Self {
             origin,
