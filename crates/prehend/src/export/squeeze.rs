@@ -145,3 +145,91 @@ fn efforts_of(hand: &Hand, grasp: &GraspRecord, forces: &InternalForces) -> Vec<
     }
     efforts
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use nalgebra::{Isometry3, UnitVector3};
+    use prehend_geometry::ContactPoint;
+    use prehend_quality::ContactForce;
+
+    use super::*;
+    use crate::hand_folder::read_described_hand;
+
+    /// A point of every link that moves, where it stands in this posture, object frame.
+    fn points(hand: &Hand, object_from_root: &Isometry3<f64>, joints: &JointPositions) -> Vec<Point3<f64>> {
+        let poses = hand.link_poses(joints);
+        let of_link = |joint: &prehend_hand::Joint| {
+            object_from_root * poses.root_from_link(joint.child) * Point3::new(0.01, -0.02, 0.03)
+        };
+        hand.joints().iter().map(of_link).collect()
+    }
+
+    #[test]
+    fn efforts_do_the_work_that_forces_do() {
+        for name in ["schunk_sdh", "human"] {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("../../hands")
+                .join(name);
+            let hand = read_described_hand(&folder).unwrap();
+            let object_from_root = Isometry3::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.4, 1.0, -0.5));
+            let middle: Vec<f64> = hand
+                .joints()
+                .iter()
+                .map(|j| f64::midpoint(j.lower, j.upper))
+                .collect();
+            let joints = hand.joint_positions_from_slice(&middle);
+            let forces = InternalForces {
+                forces: (0..hand.joints().len())
+                    .map(|k| ContactForce {
+                        force: Vector3::new((k as f64).sin(), (2.0 * k as f64).cos(), 0.3 * k as f64),
+                        torsion: 0.0,
+                    })
+                    .collect(),
+                imbalance: 0.0,
+            };
+            let at = points(&hand, &object_from_root, &joints);
+            let contacts = hand.joints().iter().zip(&at).map(|(joint, point)| {
+                let normal = UnitVector3::new_unchecked(Vector3::z());
+                (
+                    joint.child,
+                    ContactPoint {
+                        point: *point,
+                        normal,
+                    },
+                )
+            });
+            let grasp = GraspRecord {
+                grasp_id: "x".to_owned(),
+                object_from_root,
+                joints: joints.clone(),
+                contacts: contacts.collect(),
+                contact_records: Vec::new(),
+                epsilon: 0.0,
+                wrench_center: Point3::origin(),
+                torque_scale: 0.1,
+            };
+            let efforts = efforts_of(&hand, &grasp, &forces);
+            for joint in hand.free_joints() {
+                let work = |by: f64| -> f64 {
+                    let mut moved = middle.clone();
+                    moved[joint.0] += by;
+                    let moved = hand.joint_positions_from_slice(&moved);
+                    let at = points(&hand, &object_from_root, &moved);
+                    at.iter()
+                        .zip(&forces.forces)
+                        .map(|(p, f)| p.coords.dot(&f.force))
+                        .sum()
+                };
+                let expected = (work(1e-6) - work(-1e-6)) / 2e-6;
+                let found = efforts[joint.0];
+                assert!(
+                    (found - expected).abs() < 1e-6,
+                    "{name} {}: {found} {expected}",
+                    joint.0
+                );
+            }
+        }
+    }
+}
