@@ -15,6 +15,7 @@ mod opening;
 mod overlap;
 mod preshapes;
 mod text;
+mod tree;
 mod wrap;
 
 use anatomy::{Anatomy, not_a_hand};
