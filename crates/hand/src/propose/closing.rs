@@ -140,12 +140,15 @@ impl Motion {
             .into_iter()
             .collect();
         let mut best = Sides::of(anatomy, self).merit;
-        // A change must be worth it: hands oppose well where their zero is, as a rule.
-        let worth = 0.15 * best.abs().max(0.02);
+        let unmoved = best.abs();
         for _ in 0..2 {
             for &joint in &still {
                 let (low, high) = bounded(anatomy, joint);
                 let kept = self.reference[joint];
+                // A change must be worth it: hands oppose well where their zero is, as a rule. An end of a range that
+                // leaves 0 out says little.
+                let share = if low <= 0.0 && 0.0 <= high { 0.15 } else { 0.02 };
+                let worth = share * unmoved.max(0.02);
                 let mut chosen = kept;
                 for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
                     self.reference[joint] = low + share * (high - low);
