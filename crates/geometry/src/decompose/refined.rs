@@ -33,7 +33,11 @@ pub(super) fn refine(body: &Body, options: &DecomposeOptions) -> Result<Decompos
     if wanted.is_none() {
         groups = worth_their_price(body, groups, price);
     }
-    in_a_tree(body, groups)
+    let mut tree = in_a_tree(body, groups)?;
+    if let DecomposeMethod::Refined { price } = options.method {
+        undo_poor_splits(&mut tree, price);
+    }
+    Ok(Decomposition::of_tree(tree))
 }
 
 /// The number of boxes with the least union and price; the smaller of equals.
@@ -57,7 +61,7 @@ fn worth_their_price(body: &Body, groups: Vec<Group>, price: f64) -> Vec<Group> 
 }
 
 /// The groups as leaves of a tree whose inner nodes are what merging them costs least; boxes fitted where they lie.
-fn in_a_tree(body: &Body, groups: Vec<Group>) -> Result<Decomposition, GeometryError> {
+fn in_a_tree(body: &Body, groups: Vec<Group>) -> Result<Vec<TreeNode>, GeometryError> {
     let merges = agglomerate(body, groups);
     let mut tree = vec![TreeNode {
         region: body.root,
@@ -91,5 +95,42 @@ fn in_a_tree(body: &Body, groups: Vec<Group>) -> Result<Decomposition, GeometryE
             });
         }
     }
-    Ok(Decomposition::of_tree(tree))
+    Ok(tree)
+}
+
+/// Takes two leaves back into the node above them for as long as that makes union and price smaller: other boxes may
+/// cover what the split left out, which merging groups one by one does not see. `price` is a share of the root.
+fn undo_poor_splits(tree: &mut Vec<TreeNode>, price: f64) {
+    let price = price * tree[0].region.volume();
+    loop {
+        let is_leaf = |node: usize| tree[node].children.is_none();
+        let leaves: Vec<usize> = (0..tree.len()).filter(|&node| is_leaf(node)).collect();
+        let union_without = |left_out: &[usize], added: Option<usize>| {
+            let kept = leaves.iter().filter(|node| !left_out.contains(node));
+            union_volume(
+                &kept
+                    .chain(&added)
+                    .map(|&node| tree[node].region)
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let joins = (0..tree.len()).filter_map(|node| Some((node, tree[node].children?)));
+        let cheapest = joins
+            .filter(|(_, children)| children.iter().all(|&child| is_leaf(child)))
+            .map(|(node, children)| (union_without(&children, Some(node)), node))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let whole = union_without(&[], None);
+        let Some((_, node)) = cheapest.filter(|(union, _)| *union < whole + price) else {
+            return;
+        };
+        let Some([first, second]) = tree[node].children.take() else {
+            return;
+        };
+        tree.drain(first..=second);
+        let moved = |place: usize| if place > second { place - 2 } else { place };
+        for node in tree.iter_mut() {
+            node.parent = node.parent.map(moved);
+            node.children = node.children.map(|children| children.map(moved));
+        }
+    }
 }
