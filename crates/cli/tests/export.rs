@@ -294,7 +294,7 @@ fn labels_choose_grasps_by_task_and_persona() {
             "--object",
             "objects/mug/coffee_mug.ply",
             "--tries",
-            "40",
+            "150",
             "--out",
             &table,
             "--json",
