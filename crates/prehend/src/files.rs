@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use sha2::{Digest, Sha256};
 
@@ -63,6 +64,9 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     unfinished.finish()
 }
 
+/// Files begun by this process: two threads may write the same one.
+static BEGUN: AtomicU64 = AtomicU64::new(0);
+
 /// A file that is being written beside its final name; gone where it is dropped before [`Unfinished::finish`].
 pub(crate) struct Unfinished {
     path: PathBuf,
@@ -81,7 +85,9 @@ impl Unfinished {
         let name = path
             .file_name()
             .ok_or_else(|| Error::file(path, "is no file name; give a file to write"))?;
-        let beside = folder.join(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
+        let number = BEGUN.fetch_add(1, Ordering::Relaxed);
+        let own = format!("{}.{number}", std::process::id());
+        let beside = folder.join(format!(".{}.{own}.part", name.to_string_lossy()));
         Ok(Self {
             file: File::create(&beside).map_err(|e| Error::file(path, e))?,
             path: path.to_owned(),
@@ -193,6 +199,26 @@ mod tests {
         write(&path, b"old").unwrap();
         assert!(write(&path.join("below"), b"new").is_err());
         assert_eq!(read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn threads_that_write_the_same_file_do_not_take_each_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..4_u8)
+                .map(|t| {
+                    let path = &path;
+                    scope.spawn(move || (0..20).try_for_each(|_| write(path, &[t; 4096])))
+                })
+                .collect();
+            for thread in threads {
+                thread.join().unwrap().unwrap();
+            }
+        });
+        let bytes = read(&path).unwrap();
+        assert!(bytes.len() == 4096 && bytes.iter().all(|b| *b == bytes[0]));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 

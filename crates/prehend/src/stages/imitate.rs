@@ -150,8 +150,11 @@ impl<'a> Shown<'a> {
         let train = |dataset: &&Dataset, watch: Watch| {
             trainer.train_or_warn("experiment C", dataset, network, &held_out, "experiment-c", watch)
         };
-        let pair = side_by_side(watch, &[self.demonstrator, self.imitator], train)?;
-        let [Some(teacher), Some(pupil)] = pair.as_slice() else {
+        let both = [self.demonstrator, self.imitator];
+        // With one hand only, it imitates itself: one model.
+        let n_hands = if both[0].hand == both[1].hand { 1 } else { 2 };
+        let trained = side_by_side(watch, &both[..n_hands], train)?;
+        let (Some(Some(teacher)), Some(Some(pupil))) = (trained.first(), trained.last()) else {
             return Ok(None);
         };
         let answer = || {
